@@ -28,7 +28,10 @@
     if (said) said.remove();
   }
   addEventListener("kinboard-there", uncover);
-  setTimeout(() => { if (!document.getElementById("kb-failed")) uncover(); }, PATIENCE);
+  setTimeout(function again() {
+    if (root.hasAttribute("data-kb-preparing")) setTimeout(again, PATIENCE);
+    else if (!document.getElementById("kb-failed")) uncover();
+  }, PATIENCE);
 
   function element(kind, text) {
     const made = document.createElement(kind);

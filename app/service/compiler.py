@@ -25,12 +25,10 @@ from app.api.work import TooSlowError, current_deadline, stopping
 from app.shared.threads import NICENESS, lower_priority
 from kin.kernels.elsewhere import DONE
 
-STEP = 0.02  # s between two looks at the processes
 LOOK = 0.2  # s between two looks at the client and the time of a request that waits
-IDLE = 20.0  # s without a kernel to compile, after which a process ends
 RETRY_AFTER = 5  # s
-SILENT: Final = {"stderr": subprocess.DEVNULL}
 ASKED_NICENESS = NICENESS // 2  # before what is compiled ahead, behind requests and visitors
+SERVE: Final = "from kin.kernels.elsewhere import serve; serve()"
 
 logger = logging.getLogger("kinboard.compiler")
 ahead: ContextVar[bool] = ContextVar("ahead", default=False)
@@ -41,17 +39,6 @@ class CompilerStoppedError(RuntimeError):
     """The service is being stopped, so nothing is compiled any more."""
 
 
-def compile_first(*calls: str, stopping: threading.Event) -> None:
-    """Let other processes, one per call of `kin.warmup`, fill the cache, which this one then loads."""
-    children = [start_process(f"from kin import warmup; warmup.{call}", **SILENT) for call in calls]
-    try:
-        while any(child.poll() is None for child in children) and not stopping.wait(STEP):
-            pass
-    finally:
-        for child in children:
-            kill(child)
-
-
 class KernelCompiler:
     """One other process that compiles kernels, one after the other. It starts with the first, and ends when idle.
 
@@ -59,76 +46,46 @@ class KernelCompiler:
         niceness: of the process.
 
     Attributes:
-        child: the process; None: there is none.
+        child: the process, which may have ended; None: there was none.
     """
 
     def __init__(self, niceness: int = NICENESS) -> None:
         # The process inherits the priority of the thread that starts it.
         self._executor = ThreadPoolExecutor(1, "kinboard-compiler", partial(lower_priority, niceness))
         self._lock = threading.Lock()
-        self._answers: dict[str, Future[bool]] = {}  # to lines that wait or are being compiled
-        self._idle: threading.Timer | None = None
         self._stopped = self._warned = False
         self.child: subprocess.Popen[str] | None = None
 
     def submit(self, line: str) -> Future[bool]:
-        """Have the kernel of a line compiled. False: the process has ended. Do not cancel it: others may wait."""
+        """Have the kernel of a line compiled. False: the process has ended."""
         with self._lock:
             if self._stopped:
                 raise CompilerStoppedError
-            if line not in self._answers:
-                self._answers[line] = self._executor.submit(self._ask, line)
-            return self._answers[line]
+            return self._executor.submit(self._compile, line)
 
     def stop(self) -> None:
         """End the process, whatever it compiles, and all waiting. Any thread may call."""
         with self._lock:
             self._stopped = True
             self._executor.shutdown(wait=False, cancel_futures=True)
-            self._answers = {line: answer for line, answer in self._answers.items() if not answer.cancelled()}
-            if self.child is not None and self._answers:
-                self.child.kill()  # the thread that waits for it sees that
-        self._end_idle()
+            if self.child is not None:
+                kill(self.child)  # the thread that waits for it sees that
 
-    def _ask(self, line: str) -> bool:
-        try:
-            return self._compiled(line)
-        finally:
-            with self._lock:
-                del self._answers[line]
-            if self._stopped:
-                self._end_idle()
-
-    def _compiled(self, line: str) -> bool:
+    def _compile(self, line: str) -> bool:
         with self._lock:
             if self._stopped:
                 raise CompilerStoppedError
-            if self._idle is not None:
-                self._idle.cancel()
-            if self.child is None:
-                self.child = start_process("from kin.kernels.elsewhere import serve; serve()", text=True, **SILENT)
-            child = self.child
-        done = _answer(child, line) == DONE
-        with self._lock:
-            if not done:
-                kill(child)
-                self.child = None
-            if self._stopped:
-                raise CompilerStoppedError
-            if not (done or self._warned):
-                self._warned = True
-                logger.warning("a compiling process ended early; another one is started when it is needed")
-            self._idle = threading.Timer(IDLE, self._end_idle)
-            self._idle.daemon = True
-            self._idle.start()
-        return done
-
-    def _end_idle(self) -> None:
-        """End the process if nothing waits for it."""
-        with self._lock:
-            if self.child is not None and not self._answers:
+            if self.child is not None and self.child.poll() is not None:
                 kill(self.child)
                 self.child = None
+            child = self.child = self.child or start_process(SERVE, text=True, stderr=subprocess.DEVNULL)
+        done = _answer(child, line) == DONE
+        if self._stopped:
+            raise CompilerStoppedError
+        if not done and kill(child) and not self._warned:  # else it was idle
+            self._warned = True
+            logger.warning("a compiling process ended early; another one is started when it is needed")
+        return done
 
 
 class Compilers:
@@ -189,9 +146,9 @@ def _answer(child: subprocess.Popen[str], line: str) -> str:
     try:
         child.stdin.write(line + "\n")
         child.stdin.flush()
-    except OSError:
+        return child.stdout.readline().strip()
+    except (OSError, ValueError):  # its pipes are closed
         return ""
-    return child.stdout.readline().strip()
 
 
 def start_process(program: str, **options: Any) -> subprocess.Popen[Any]:

@@ -2,10 +2,9 @@
 
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
-arm are; all others are compiled after that, part by part (:mod:`app.shared.preparation`), by another process
-(:mod:`app.service.compiler`). Those of the first arm are compiled by two such processes at once. A request that
-needs a kernel before its turn has it compiled at once, by a process of its own. The processes that compute for
-REST load what is compiled.
+arm are; all others are compiled after that, part by part (:mod:`app.shared.preparation`). Other processes compile
+(:mod:`app.service.compiler`): two of them the kernels of the first arm, one the others, and one what a request
+needs before its turn. The processes that compute for REST load what is compiled.
 """
 
 from __future__ import annotations
@@ -15,16 +14,17 @@ import importlib
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Literal
 
-from app.service.compiler import Compilers, CompilerStoppedError, ahead, compile_first
+from app.service.compiler import Compilers, CompilerStoppedError, ahead
 from app.service.compute.child import load_first, load_rest
 from app.service.compute.pool import Pool
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.preparation import Preparation
-from app.shared.threads import every_processor, lower_priority, unpin
+from app.shared.threads import lower_priority
 from kin.kernels.elsewhere import compile_elsewhere
-from kin.warmup import compiled, parts, rest_compiled, warm_up_first, warm_up_rest
+from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer
@@ -46,7 +46,6 @@ class Startup:
     Attributes:
         complete: whether all kernels are compiled.
         preparation: which kernels are compiled.
-        named: whether this process knows the parts of the preparation, for which it looks at all families of arms.
     """
 
     def __init__(
@@ -65,7 +64,6 @@ class Startup:
         self._viewer: ViewerServer | None = None
         self._loop: asyncio.AbstractEventLoop
         self.preparation = Preparation()
-        self.named = False
         self.compilers = Compilers()
         self._stopping = threading.Event()
         self._viewer_settled = threading.Event()
@@ -96,10 +94,9 @@ class Startup:
     def _run(self) -> None:
         try:
             self._start_viewer()
-            if not compiled():
-                unpin()  # also what this thread starts
-                second = ["warm_up_first(backwards=True)"] if len(every_processor()) > 1 else []
-                compile_first("warm_up_first()", *second, stopping=self._stopping)
+            if not (compiled() or self._stopping.is_set()):
+                with ThreadPoolExecutor(2, "kinboard-warm-up") as threads:
+                    list(threads.map(self._warm_up_first, (False, True)))
             if not self._stopping.is_set():
                 warm_up_first()
                 if self._pool is not None:
@@ -115,12 +112,15 @@ class Startup:
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
             self.status = "failed"
 
+    @staticmethod
+    def _warm_up_first(backwards: bool) -> None:
+        ahead.set(backwards)  # each has a compiling process
+        warm_up_first(backwards=backwards)
+
     def _warm_up_rest(self) -> None:
         lower_priority()
         ahead.set(True)
         try:
-            parts()  # here and not where they are first asked for
-            self.named = True
             self._prepare_parts()
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():
@@ -139,11 +139,9 @@ class Startup:
         try:
             if not rest_compiled():
                 self.preparation.begin()
-            while not (self._stopping.is_set() or self.preparation.complete):
-                if (task := self.preparation.next()) is None:
-                    break
+            while not self._stopping.is_set() and (task := self.preparation.next()) is not None:
                 name, step = task
-                parts()[name][step]()
+                step()
                 self.preparation.done(name)
         finally:
             self.preparation.finish()

@@ -76,7 +76,7 @@ async def readyz(request: Request, response: Response) -> Readiness:
     return Readiness(
         status=status,
         complete=startup.complete,
-        kernels=_kernels(startup.preparation) if status == "ready" and startup.named else None,
+        kernels=_kernels(startup.preparation) if status == "ready" else None,
         classrooms=await run_in_threadpool(_classrooms, request),
     )
 

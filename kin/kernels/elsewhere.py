@@ -8,6 +8,7 @@ it. So a service asks another process (`compile_elsewhere`), which compiles what
 
 from __future__ import annotations
 
+import os
 import pickle
 import sys
 import threading
@@ -24,6 +25,7 @@ from kin.kernels.private import CACHE, CALLS, MISSING
 TRIES = 2  # processes that may end before a kernel is compiled here
 VAIN = 3  # kernels that were compiled and not kept, as on a full disk, after which no other process is asked
 DONE = "done"  # the answer to each line
+IDLE = 20.0  # s without a kernel to compile, after which a process ends: it keeps a gigabyte of memory
 
 Ask = Callable[[str], bool]
 
@@ -58,11 +60,24 @@ def compile_elsewhere(ask: Ask | None) -> None:
 
 
 def serve() -> None:
-    """Compile the kernel that each line of the standard input names, and say on the standard output when it is."""
+    """Compile the kernel that each line of the standard input names, and say on the standard output when it is.
+
+    The process ends after `IDLE` seconds without a line.
+    """
+    end = _end_when_idle()
     for line in sys.stdin:
+        end.cancel()
         module, name, signature = line.split()
         getattr(import_module(module), name).compile(pickle.loads(bytes.fromhex(signature)))
         print(DONE, flush=True)
+        end = _end_when_idle()
+
+
+def _end_when_idle() -> threading.Timer:
+    timer = threading.Timer(IDLE, os._exit, (0,))
+    timer.daemon = True
+    timer.start()
+    return timer
 
 
 def _compile_with_help(kernel: Any, signature: Any) -> Any:

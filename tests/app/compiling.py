@@ -14,7 +14,7 @@ PROGRAM = (
     "parent = os.getppid()\n"
     "for line in sys.stdin:\n"
     "    file = pathlib.Path(line.strip())\n"
-    "    if file.name == 'end': sys.exit()\n"
+    "    if file.name == 'end': sys.exit(1)\n"
     "    while not file.exists():\n"
     "        if os.getppid() != parent: sys.exit()  # the test was killed\n"
     "        time.sleep(0.01)\n"

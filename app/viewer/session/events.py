@@ -16,7 +16,6 @@ from typing import Final
 # is released or a cell is left; the longer time is for a report that was lost.
 SHORT_PAUSE: Final = 1.0
 LONG_PAUSE: Final = 20.0
-LINK: Final = "link"  # event of a stored state that waits for kernels
 FENCE: Final = "fence"  # event of an answer of the page
 
 
@@ -31,9 +30,8 @@ class Rule:
         message: whether the page's own script may send it.
         answered: whether its handler replies to that message.
         act: whether it moves the arm or opens something, which ends a lead and is refused in a class that is
-            frozen, and while a stored state waits for its kernels. Of a feature's events only messages count:
-            features also post what they have computed.
-        replaces: whether nobody waits any more for another robot, or for a stored state.
+            frozen. Of a feature's events only messages count: features also post what they have computed.
+        replaces: whether nobody waits any more for another robot that is being compiled.
     """
 
     label: str = ""
@@ -90,7 +88,6 @@ RULES: Final[dict[str, Rule]] = {
     "undo": Rule(step=False, message=True, act=True, replaces=True),
     "redo": Rule(step=False, message=True, act=True, replaces=True),
     "travel": Rule(step=False, message=True, act=True, replaces=True),
-    LINK: Rule(step=False, replaces=True),
     FENCE: Rule(step=False),
 }
 MESSAGES: Final = tuple(name for name, rule in RULES.items() if rule.message)

@@ -45,7 +45,7 @@ from app.viewer.session.channel.channel import Channel
 from app.viewer.session.channel.files import Files
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
-from app.viewer.session.events import FENCE, LINK
+from app.viewer.session.events import FENCE
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.live import LiveInput
@@ -56,7 +56,7 @@ from app.viewer.session.posture import PosturePanel
 from app.viewer.session.preparing import Preparing
 from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
-from app.viewer.session.state import PageState, without_arm
+from app.viewer.session.state import PageState
 from app.viewer.session.worker.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.tabs.program.tab import ProgramTab
@@ -413,11 +413,7 @@ class VisitorPage(ShownArm, Worker):
     def _act(self, key: Hashable, value: object) -> None:
         if not self._preparing.admits(key, value):
             return
-        if key == LINK and isinstance(value, PageState):
-            self._actions.adopt(value)
-            self._persistence.restore(value)
-        else:
-            self._actions.handle(key, value)
+        self._actions.handle(key, value)
 
     def _show_hints(self) -> None:
         """Tell ``static/hints.js`` where gizmo and arm are in the picture.
@@ -436,17 +432,17 @@ class VisitorPage(ShownArm, Worker):
 
     def _prepare(self) -> None:
         self._persistence.load()
+        saved = self._persistence.stored
+        self.own = saved.own
+        self._preparing.wait(saved, robot_of(self, saved.robot), self.offered, lambda: self._inbox.closed)
 
     def _build(self) -> None:
         gui = self.client.gui
         saved = self._persistence.stored
         self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
         size_labels(self.client.scene, text_factor(self._persistence.text_size))
-        self.own, self.frames = saved.own, saved.frames
+        self.frames = saved.frames
         robot = robot_of(self, saved.robot)
-        later = self._preparing.lacks(saved, robot, self.offered)
-        if later:
-            saved, robot = without_arm(saved), self.store.robots[0]
         with self.client.atomic(), self.channel.step(0):
             if self.dark:
                 configure_theme(gui, True)
@@ -486,9 +482,6 @@ class VisitorPage(ShownArm, Worker):
                     self.tabs.append(tab(self))
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
-            if later:
-                stored = self._persistence.stored
-                self._preparing.hold_state(stored, robot_of(self, stored.robot), self.offered)
             self._show_hints()
             learns = self._persistence.stored.lesson is not None
             self.channel.show("start", [self._persistence.begin(self.panel.share), LEARN if learns else ""])

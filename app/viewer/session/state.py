@@ -142,20 +142,6 @@ def with_arm(robot: Robot, q: Array | None, known: Iterable[Robot]) -> PageState
     return PageState(robot=own.robot.id, own=own, q=q)
 
 
-def without_arm(state: PageState) -> PageState:
-    """A state as far as it does not depend on the robot on show."""
-    return PageState(
-        units=state.units,
-        view=state.view,
-        own=state.own,
-        frames=state.frames,
-        missing=state.missing,
-        unreadable=state.unreadable,
-        ignored=state.ignored,
-        refused=state.refused,
-    )
-
-
 class Written(NamedTuple):
     """A state as a text, and the keys of the features, or "obstacles", that it had no room for."""
 

@@ -17,13 +17,14 @@ import httpx2
 import psutil
 import pytest
 import viser
+from compiling import kernel, stand_in_for_the_compiler
 from fastapi.testclient import TestClient
 from live_server import serve, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-import app.service.compiler
 import app.service.startup
+import app.shared.preparation
 from app.service.main import create_app, run
 from app.shared.settings import Settings, static_folder
 from app.viewer.server import ViewerServer
@@ -80,34 +81,34 @@ def test_during_warm_up_pages_are_served_and_readyz_reports_warming(monkeypatch)
         assert client.get("/readyz").status_code == 200
 
 
-@pytest.mark.parametrize("processors", [1, 2])
-def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monkeypatch, processors):
-    popen = subprocess.Popen
-    started: list[subprocess.Popen] = []
-    steps: list[str] = []
+def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monkeypatch, tmp_path):
+    stand_in_for_the_compiler(monkeypatch)
+    first, rest = (kernel(tmp_path, name, ready=False) for name in ("first", "rest"))
+    service = create_app(Settings())
+    compilers, began = service.state.startup.compilers, []
 
-    def start(command, **options):
-        started.append(popen(["true"] if "first" in command[-1] else ["sleep", "300"], **options))
-        steps.append(command[-1])
-        return started[-1]
+    def warm_up_first(*, backwards=False):
+        began.append(backwards)
+        compilers.compile(first)
 
-    monkeypatch.setattr(app.service.compiler.subprocess, "Popen", start)
     monkeypatch.setattr(app.service.startup, "compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "rest_compiled", lambda: False)
-    monkeypatch.setattr(app.service.startup, "every_processor", lambda: range(processors))
-    service = create_app(Settings())
-    missing = {name: (lambda: service.state.startup.compilers.compile("a kernel"),) for name in parts()}
-    monkeypatch.setattr(app.service.startup, "parts", lambda: missing)
+    monkeypatch.setattr(app.service.startup, "warm_up_first", warm_up_first)
+    missing = {name: (lambda: compilers.compile(rest),) for name in parts()}
+    monkeypatch.setattr(app.shared.preparation, "parts", lambda: missing)
     with TestClient(service) as client:
+        wait_for(lambda: compilers.asked.child is not None and compilers.ahead.child is not None)
+        assert client.get("/readyz").status_code == 503
+        Path(first).touch()
         wait_for(lambda: client.get("/readyz").status_code == 200, 120)
-        wait_for(lambda: steps and "serve()" in steps[-1])
-        assert started[-1].poll() is None
+        wait_for(lambda: (kernels := client.get("/readyz").json()["kernels"]) and kernels["preparing"])
         kernels = client.get("/readyz").json()["kernels"]
         assert kernels["ready"] == [first_family()]
         assert [kernels["preparing"], *kernels["waiting"]] == list(parts())
-    first = ["warm_up_first()", "warm_up_first(backwards=True)"][:processors]
-    assert steps[:-1] == [f"from kin import warmup; warmup.{call}" for call in first]
-    wait_for(lambda: started[-1].poll() is not None)
+        processes = compilers.asked.child, compilers.ahead.child
+        assert [process.poll() for process in processes] == [None, None]
+    assert sorted(began) == [False, False, True]
+    assert None not in [process.poll() for process in processes]
 
 
 def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):

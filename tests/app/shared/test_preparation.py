@@ -47,17 +47,18 @@ def test_parts_come_in_their_order_and_are_ready_with_their_last_step():
     preparation, seen = begun(), []
     while (task := preparation.next()) is not None:
         name, step = task
+        done, of = preparation.steps((name,))
+        assert step is parts()[name][done]
+        assert of == len(parts()[name])
+        assert not preparation.complete
         assert not preparation.ready((name,))
-        assert preparation.steps((name,)) == (step, len(parts()[name]))
         assert preparation.state[1] == name
         preparation.done(name)
         seen.append(task)
-    assert seen == [(name, step) for name, steps in parts().items() for step in range(len(steps))]
+    assert seen == [(name, step) for name, steps in parts().items() for step in steps]
+    assert preparation.complete
     assert preparation.ready(parts())
     assert preparation.state == ([first_family(), *parts()], None, [])
-    assert not preparation.complete
-    preparation.finish()
-    assert preparation.complete
 
 
 def test_what_is_wanted_comes_next_even_within_another_part():
@@ -65,12 +66,12 @@ def test_what_is_wanted_comes_next_even_within_another_part():
     first, *others = parts()
     preparation.done(first)
     preparation.want((others[4], "no part", others[2]))
-    assert preparation.next() == (others[2], 0)
+    assert preparation.next() == (others[2], parts()[others[2]][0])
     assert preparation.state[2] == [name for name in parts() if name != others[2]]
     finish_part(preparation, others[2])
-    assert preparation.next() == (others[4], 0)
+    assert preparation.next() == (others[4], parts()[others[4]][0])
     finish_part(preparation, others[4])
-    assert preparation.next() == (first, 1)
+    assert preparation.next() == (first, parts()[first][1])
     assert not preparation.ready((others[2], first))
     assert preparation.ready((others[2], others[4]))
 

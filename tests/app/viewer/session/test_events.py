@@ -13,7 +13,7 @@ import pytest
 from app.live import EVENTS
 from app.shared.security import HELLO
 from app.viewer.session.events import (
-    LINK,
+    FENCE,
     LONG_PAUSE,
     MESSAGES,
     RULES,
@@ -84,7 +84,7 @@ def sent() -> set[str]:
 
 def events() -> set[str]:
     """The names of all events, without what only wraps a message."""
-    found = {LINK, *EVENTS} | sent() - {HELLO}  # which the channel keeps to itself
+    found = {FENCE, *EVENTS} | sent() - {HELLO}  # which the channel keeps to itself
     for path in VIEWER.rglob("*.py"):
         inside = path.relative_to(VIEWER).parts[0] in OF_THE_PAGE
         found |= set(posted(path.read_text(encoding="utf-8"), inside))

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+import threading
 import time
 from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import serve_viewer
+from live_server import serve_viewer, wait_for
 
 import kin
 from app.api import ComputeSlots, api_routes
@@ -26,7 +28,6 @@ from app.shared.preparation import Preparation
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.arm import Arm
-from app.viewer.panel.joints import label
 from app.viewer.server import ViewerServer
 from app.viewer.session.preparing import HELD, Preparing
 from app.viewer.session.state import PageState, encode
@@ -34,7 +35,7 @@ from kin.solvers import family_of
 from kin.warmup import COLLISIONS, MOTIONS, all_of, parts
 
 STORE = Store()
-PIONEER, UR5, PLANAR, PUMA, SCARA = map(STORE.get, ("pioneer5", "ur5", "planar3r", "puma560", "scara"))
+PIONEER, UR5, PLANAR = map(STORE.get, ("pioneer5", "ur5", "planar3r"))
 
 
 @pytest.fixture
@@ -74,7 +75,9 @@ def test_an_arm_opens_by_itself_when_it_is_compiled_and_the_page_can_be_used_mea
         of = len(parts()[family_of(UR5)]) + len(parts()[COLLISIONS])
         waits_for(tab, "the UR5")
         tab.wait(lambda: f"step 1 of {of}" in tab.html)
-        assert preparation.next() == (COLLISIONS, 0), "both parts are wanted, this one comes first"
+        assert preparation.next() == (COLLISIONS, parts()[COLLISIONS][0]), (
+            "both parts are wanted, this one comes first"
+        )
         preparation.done(COLLISIONS)
         tab.wait(lambda: f"step 2 of {of}" in tab.html)
         tab.set("1 rotating base", 37.25)
@@ -103,18 +106,27 @@ def test_the_last_choice_counts_and_the_arm_on_show_ends_the_waiting(port, prepa
         assert np.allclose(tab.tool_pose(), kin.fk(PIONEER, PIONEER.q_home))
 
 
-def test_a_lesson_waits_for_what_it_calls_and_others_open_at_once(port, preparation):
+def test_a_lesson_waits_for_what_it_calls(port, preparation):
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Lesson", "Redundancy")
+        waits_for(tab, "the lesson “Redundancy”")
+        compile_parts(preparation, (all_of(family_of(PIONEER)),))
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert tab.value("Lesson") == "Redundancy"
+
+
+def test_a_lesson_that_needs_nothing_opens_at_once_and_stays(port, preparation):
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.set("Lesson", "Redundancy")
         waits_for(tab, "the lesson “Redundancy”")
         tab.set("Lesson", "Screws")
-        tab.settle()
-        assert "Preparing" in tab.html
-        compile_parts(preparation, (all_of(family_of(PIONEER)),))
         tab.wait(lambda: "Preparing" not in tab.html)
+        compile_parts(preparation, parts())
         tab.settle()
-        assert tab.value("Lesson") == "Redundancy"
+        assert tab.value("Lesson") == "Screws", "it was chosen last"
 
 
 def test_events_of_a_tab_wait(port, preparation):
@@ -122,27 +134,35 @@ def test_events_of_a_tab_wait(port, preparation):
         tab.settle()
         tab.say("feature", ["program", ["record"], None])
         waits_for(tab, "“Program”")
-        assert preparation.next() == (MOTIONS, 0)
+        assert preparation.next() == (MOTIONS, parts()[MOTIONS][0])
         compile_parts(preparation, (MOTIONS,))
         tab.wait(lambda: "Preparing" not in tab.html)
 
 
-def test_a_link_opens_when_its_arm_is_compiled(port, preparation):
+def test_a_page_of_a_link_waits_for_its_arm_and_says_so(port, preparation):
     q = UR5.q_home + 0.1
     link = encode(PageState(robot="ur5", q=q, lesson="redundancy"))
-    with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
-        waits_for(tab, "the UR5")
-        assert tab.value("Robot") == PIONEER.name
-        assert arrows_of_hints(tab) == 0.0
-        compile_parts(preparation, (COLLISIONS, family_of(UR5)))
-        tab.settle()
-        assert tab.value("Robot") == PIONEER.name, "its lesson needs more"
-        compile_parts(preparation, (all_of(family_of(UR5)),))
-        tab.wait(lambda: "Preparing" not in tab.html)
+    needed = (COLLISIONS, family_of(UR5), all_of(family_of(UR5)))
+    of = sum(len(parts()[name]) for name in needed)
+    with closing(FakeBrowser(port, memory=json.dumps({"state": link}))) as tab:
+        tab.wait(lambda: f"Preparing the UR5 for the first time on this machine: step 1 of {of}" in preparing(tab))
+        compile_parts(preparation, needed[:2])
+        tab.wait(lambda: "step 1 of" not in preparing(tab))
+        assert not any(m["type"] == "TransformControlsMessage" for m in tab.nodes.values()), (
+            "its lesson needs more"
+        )
+        compile_parts(preparation, needed[2:])
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
         assert tab.value("Lesson") == "Redundancy"
-        tab.wait(lambda: arrows_of_hints(tab) > 0.0)
+        assert preparing(tab) == ""
+
+
+def test_a_visitor_who_leaves_is_waited_for_no_longer(port, preparation):
+    link = encode(PageState(robot="ur5"))
+    with closing(FakeBrowser(port, memory=json.dumps({"state": link}))) as tab:
+        tab.wait(lambda: preparing(tab) != "")
+    wait_for(lambda: not any(thread.name.startswith("visitor-") for thread in threading.enumerate()))
 
 
 def test_a_link_to_what_is_compiled_opens_at_once(port):
@@ -152,21 +172,9 @@ def test_a_link_to_what_is_compiled_opens_at_once(port):
         assert "Preparing" not in tab.html
 
 
-def sliders(tab: FakeBrowser, name: str) -> list[str]:
-    """The ids of the sliders with this label, one in each folder that shows the joints."""
-    return [uuid for uuid, m in tab.gui.items() if m["type"] == "GuiSliderMessage" and m["props"]["label"] == name]
-
-
-def has_arrows(tab: FakeBrowser) -> bool:
-    """Whether the target of the arm on show can be seen, and dragged."""
-    return tab.visible.get(tab.gizmo, True)
-
-
-def arrows_of_hints(tab: FakeBrowser) -> float:
-    """How long the arrows are of which the first hint speaks; 0: it is not shown."""
-    found = re.search(r'data-hints="\S+ \S+ (\S+)"', tab.html)
-    assert found is not None
-    return float(found[1])
+def preparing(tab: FakeBrowser) -> str:
+    """What the cover of the page says that it waits for."""
+    return tab.shown.get("preparing") or ""
 
 
 def program(tab: FakeBrowser, lines: Lines) -> Line:
@@ -180,91 +188,6 @@ def program(tab: FakeBrowser, lines: Lines) -> Line:
     assert line is not None
     line.connect(Program("arm.py", "session", lambda: None))
     return line
-
-
-@pytest.mark.parametrize(
-    "event", [("jog", ["tool", 0, 1, 10]), ("nudge", [2, False, 1, False]), ("target", ["position", "100 0 100"])]
-)
-def test_what_would_move_the_arm_on_show_says_that_the_page_waits_for_that_of_a_link(port, preparation, event):
-    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="puma560"))})) as tab:
-        waits_for(tab, "the PUMA 560")
-        tab.wait(lambda: not has_arrows(tab))
-        before = tab.value(label(PIONEER, 0))
-        tab.set(label(PIONEER, 0), before + 20.0)
-        tab.wait(lambda: tab.value(label(PIONEER, 0)) == before)
-        number = tab.say(*event)
-        refused = "The page waits for the PUMA 560. It can be moved when it is there."
-        tab.wait(lambda: refused in tab.html)
-        tab.wait(lambda: tab.script["reply"][:2] == [number, refused])
-        compile_parts(preparation, parts())
-        tab.wait(lambda: "Preparing" not in tab.html and tab.value("Robot") == PUMA.name)
-        tab.settle()
-        assert has_arrows(tab)
-        assert np.allclose(tab.tool_pose(), kin.fk(PUMA, PUMA.q_home))
-
-
-def test_the_arm_on_show_can_be_dragged_again_when_another_robot_is_chosen(port, preparation):
-    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="puma560"))})) as tab:
-        waits_for(tab, "the PUMA 560")
-        tab.wait(lambda: not has_arrows(tab))
-        tab.set("Robot", PLANAR.name)
-        waits_for(tab, f"the {PLANAR.name}")
-        tab.wait(lambda: has_arrows(tab))
-        tab.wait(lambda: arrows_of_hints(tab) > 0.0)
-
-
-def test_a_lesson_chosen_before_the_arm_of_a_link_is_compiled_opens_with_that_arm(port, preparation):
-    link = encode(PageState(robot="puma560", lesson="velocity"))
-    with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
-        waits_for(tab, "the PUMA 560")
-        tab.set("Lesson", "Screws")
-        tab.settle()
-        compile_parts(preparation, parts())
-        tab.wait(lambda: "Preparing" not in tab.html)
-        tab.settle()
-        assert tab.value("Robot") == PUMA.name
-        assert tab.value("Lesson") == "Screws", "it is not lost to that of the link"
-        assert 'data-lesson="Screws"' in tab.html
-
-
-def test_a_lesson_chosen_for_a_link_opens_with_another_robot_that_is_chosen_instead(port, preparation):
-    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="ur5"))})) as tab:
-        waits_for(tab, "the UR5")
-        tab.set("Lesson", "Screws")
-        tab.set("Robot", PLANAR.name)
-        waits_for(tab, f"the {PLANAR.name}")
-        compile_parts(preparation, parts())
-        tab.wait(lambda: "Preparing" not in tab.html and 'data-lesson="Screws"' in tab.html)
-        assert tab.value("Robot") == PLANAR.name
-
-
-def test_what_a_program_sends_waits_for_the_arm_of_a_link(port, preparation, lines):
-    q = SCARA.q_home + 0.05
-    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="scara"))})) as tab:
-        waits_for(tab, f"the {SCARA.name}")
-        line = program(tab, lines)
-        line.send({"q": q}, 1)
-        tab.settle()
-        assert all(reply.preparing is not None for reply in line.replies())
-        compile_parts(preparation, parts())
-        tab.wait(lambda: "Preparing" not in tab.html)
-        tab.settle()
-        assert np.allclose(tab.tool_pose(), kin.fk(SCARA, q))
-        assert [reply for reply in line.replies() if reply.preparing is None] == [Reply(1)]
-
-
-def test_a_program_that_sends_q_for_a_link_is_answered_if_another_robot_is_chosen(port, preparation, lines):
-    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="scara"))})) as tab:
-        waits_for(tab, f"the {SCARA.name}")
-        line = program(tab, lines)
-        line.send({"q": SCARA.q_home}, 1)
-        tab.settle()
-        tab.set("Robot", PLANAR.name)
-        waits_for(tab, f"the {PLANAR.name}")
-        tab.settle()
-        (reply,) = [reply for reply in line.replies() if reply.preparing is None]
-        assert reply.number == 1
-        assert reply.problem is not None, "it has too many values for the arm on show"
 
 
 def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, lines):
