@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from app.cli.startup import hidden, no_collections
 from app.shared.settings import OBSOLETE, Settings
 
-FLAGS = ("host", "port", "root_path", "robots", "read_only", "pin")  # they override the environment
+FLAGS = ("host", "port", "root_path", "robots", "read_only")  # they override the environment
 
 SECRET = ("token", "database_url")  # logs keep what is printed
 
@@ -23,8 +23,10 @@ def run(arguments: Namespace) -> int:
     """Serve until Ctrl-C; 2 for an invalid setting."""
     for name in sorted(OBSOLETE.keys() & os.environ.keys()):
         print(f"kinboard: {name} does nothing any more: {OBSOLETE[name]}.", file=sys.stderr)
-    if arguments.workers is not None:
-        print(f"kinboard: --workers does nothing any more: {OBSOLETE['KINBOARD_WORKERS']}.", file=sys.stderr)
+    for option in ("workers", "pin"):
+        if getattr(arguments, option):
+            why = OBSOLETE[f"KINBOARD_{option.upper()}"]
+            print(f"kinboard: --{option} does nothing any more: {why}.", file=sys.stderr)
     settings = read_settings({name: value for name in FLAGS if (value := getattr(arguments, name)) is not None})
     if settings is None:
         return 2

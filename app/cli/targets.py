@@ -31,7 +31,7 @@ from app.cli.pipes.poses import INVALID, Answers, Counted, PoseTable, Target, an
 from app.cli.pipes.source import UTF16
 from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
-from app.shared.threads import every_processor
+from app.shared.threads import processors
 from kin import IKOptions, InputError, Robot, Status
 
 Array = NDArray[np.float64]
@@ -105,7 +105,7 @@ def solve_file(question: Question, source: Path, output: Path, dask: str | None 
 def _solvers(dask: str | None) -> Iterator[tuple[Executor, int]]:
     """What solves pieces, and how many it solves at a time: threads, or the workers of a Dask cluster."""
     if dask is None:
-        count = len(every_processor())
+        count = processors()
         with ThreadPoolExecutor(count, thread_name_prefix="targets") as pool:
             yield pool, count
         return

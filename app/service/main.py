@@ -62,7 +62,7 @@ from app.shared.settings import Settings, static_folder
 from app.shared.slots import Slots
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.shared.threads import end_process, pin
+from app.shared.threads import end_process
 from kin import InputError, RobotFileError, __version__
 
 if TYPE_CHECKING:
@@ -267,8 +267,6 @@ def _serve(
         alone: whether no other process would start it again.
     """
     guard_log()
-    if settings.pin:
-        pin()
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH_INTERVAL)

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from app.shared.threads import every_processor
+from app.shared.threads import processors
 from kin import InputError
 from kin.workspace import CapabilityBlock, CapabilityGrid, capability_block
 
@@ -36,7 +36,7 @@ def run_local(
         threads: how many; by default one per available processor.
         begin: called by each thread first, for instance to lower its priority.
     """
-    pool = ThreadPoolExecutor(threads or len(every_processor()), "capability", begin)
+    pool = ThreadPoolExecutor(threads or processors(), "capability", begin)
     try:
         futures = [pool.submit(capability_block, grid, number) for number in range(len(grid.blocks))]
         for future in as_completed(futures):

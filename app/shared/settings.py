@@ -14,7 +14,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.shared.clients import Proxies
 from app.shared.security import frame_ancestor
-from app.shared.threads import every_processor
+from app.shared.threads import background_threads
 
 
 def _listed(value: object) -> object:
@@ -35,7 +35,10 @@ OBSOLETE: Final[Mapping[str, str]] = MappingProxyType(
         ("KINBOARD_WORKERS", "KINBOARD_REST_WORKERS"),
         "the service is one process, and KINBOARD_COMPUTE says how many compute for it",
     )
-    | {"KINBOARD_BENCH": "visitors start no benchmark; kinboard bench --html FILE makes a scoreboard"}
+    | {
+        "KINBOARD_BENCH": "visitors start no benchmark; kinboard bench --html FILE makes a scoreboard",
+        "KINBOARD_PIN": "the service is no faster on one processor",
+    }
 )
 
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)]
@@ -138,7 +141,6 @@ class Settings(BaseSettings):
         le=3600,
         description="Seconds without a step of the event loop after which the service ends and is started again.",
     )
-    pin: bool = Field(False, description="Keep the interpreter of the service on one processor, for faster drags.")
     drain: float = Field(
         5.0, ge=1, le=300, description="Seconds that running requests may take after the service is asked to stop."
     )
@@ -214,7 +216,7 @@ class Settings(BaseSettings):
     @property
     def processes(self) -> int:
         """How many processes compute for REST."""
-        return max(1, len(every_processor()) - 1) if self.compute is None else self.compute
+        return background_threads() if self.compute is None else self.compute
 
     @property
     def data_folder(self) -> Path:

@@ -50,9 +50,7 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     parser.add_argument(
         "--workers", type=whole_number, metavar="N", help="does nothing any more: see KINBOARD_COMPUTE"
     )
-    parser.add_argument(
-        "--pin", action="store_true", default=None, help="keep the interpreter of the service on one processor"
-    )
+    parser.add_argument("--pin", action="store_true", help="does nothing any more")
     parser.add_argument("--root-path", metavar="PREFIX", help="path prefix that a reverse proxy adds")
     parser.add_argument(
         "--read-only",

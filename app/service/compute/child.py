@@ -18,7 +18,7 @@ import signal
 import struct
 import threading
 import traceback
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import IO, Final
 
@@ -44,15 +44,10 @@ _LENGTH = struct.Struct(">Q")
 
 @dataclass(frozen=True)
 class Begin:
-    """The first message to a process.
-
-    Attributes:
-        processors: on which it may run, whatever the service is pinned to.
-    """
+    """The first message to a process."""
 
     settings: Settings
     robots: tuple[Robot, ...]
-    processors: Collection[int]
 
 
 @dataclass(frozen=True)
@@ -153,8 +148,6 @@ def main() -> None:
     guard_log()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_IGN)  # sent to the whole service: this process ends with it
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, begin.processors)
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     api_routes()  # imports and builds what computations refer to

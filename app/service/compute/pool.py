@@ -31,7 +31,6 @@ from app.service.compute.process import ComputeProcess, Job, LostError
 from app.shared.memory.process import resident_bytes
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.shared.threads import every_processor
 from kin import Robot
 
 T = TypeVar("T")
@@ -58,7 +57,7 @@ class Pool:
     def __init__(self, count: int, settings: Settings, store: Store) -> None:
         self.count = count
         self._settings, self._store = settings, store
-        begin = pickle.dumps(Begin(settings, store.robots, every_processor()))
+        begin = pickle.dumps(Begin(settings, store.robots))
         self.processes = [ComputeProcess(begin) for _ in range(count)]
         self._free = deque(self.processes)
         self._jobs: dict[Job, ComputeProcess] = {}  # under way

@@ -1,10 +1,4 @@
-"""Threads: which processors they run on, their priority, and how a process ends in spite of them.
-
-Of a process's threads only one at a time runs Python. A gizmo drag passes from the event loop to the thread of
-visitors and back; if each wakes up on another processor, a drag among many visitors may take longer than on a
-single one. So `pin` keeps a process on one processor. Threads that compute outside the interpreter for long, such
-as those of clouds and maps, call `lower_priority` first: it unpins them and lets visitors go first.
-"""
+"""Threads: how many compute, their priority, and how a process ends in spite of them."""
 
 from __future__ import annotations
 
@@ -12,7 +6,6 @@ import atexit
 import contextlib
 import multiprocessing.util
 import os
-import random
 import sys
 import threading
 import weakref
@@ -20,38 +13,20 @@ from typing import NoReturn
 
 NICENESS = 10  # of threads that compute in the background
 
-_processors: set[int] = set()  # those available before this process was pinned
 
-
-def pin() -> None:
-    """Keep this thread and those it starts on one processor. Does nothing where the system has no such call."""
-    if not hasattr(os, "sched_setaffinity"):  # Linux only
-        return
-    available = sorted(os.sched_getaffinity(0))
-    _processors.update(available)
-    os.sched_setaffinity(0, {random.choice(available)})
-
-
-def unpin() -> None:
-    """Let this thread run on every processor again."""
-    if _processors:
-        os.sched_setaffinity(0, _processors)
-
-
-def every_processor() -> frozenset[int]:
-    """Numbers of the processors that were available before this process was pinned."""
+def processors() -> int:
+    """How many processors this process may use."""
     try:
-        return frozenset(_processors or os.sched_getaffinity(0))
+        return len(os.sched_getaffinity(0))
     except AttributeError:  # not on Linux
-        return frozenset(range(os.cpu_count() or 1))
+        return os.cpu_count() or 1
 
 
 def lower_priority(niceness: int = NICENESS) -> None:
-    """Let the threads of visitors run before this one, and this one on any processor.
+    """Let the threads of visitors run before this one.
 
-    Linux has a niceness per thread. Elsewhere niceness belongs to the process, so only `unpin` is done.
+    Linux has a niceness per thread. Elsewhere niceness belongs to the process, and nothing is done.
     """
-    unpin()
     if sys.platform == "linux":
         thread = threading.get_native_id()
         own = os.getpriority(os.PRIO_PROCESS, thread)  # who started the process may have lowered it farther
@@ -86,4 +61,4 @@ def forget_exit_handlers() -> None:
 
 def background_threads() -> int:
     """How many threads a background computation uses: all processors but one."""
-    return max(1, len(every_processor()) - 1)
+    return max(1, processors() - 1)

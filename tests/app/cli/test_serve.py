@@ -23,12 +23,16 @@ def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
     monkeypatch.setattr(serve, "import_service", lambda: run)
     for name in OBSOLETE:
         monkeypatch.setenv(name, "2")
-    assert main(["serve", "--workers", "3", "--port", "0"]) == 0
+    assert main(["serve", "--workers", "3", "--pin", "--port", "0"]) == 0
     said = capsys.readouterr().err.splitlines()
-    names = ("KINBOARD_BENCH", "KINBOARD_REST_WORKERS", "KINBOARD_WORKERS", "--workers")
-    assert [line.partition(" does nothing")[0] for line in said] == [f"kinboard: {name}" for name in names]
+    names = ("BENCH", "PIN", "REST_WORKERS", "WORKERS")
+    assert [line.partition(" does nothing")[0] for line in said] == [
+        *(f"kinboard: KINBOARD_{name}" for name in names),
+        "kinboard: --workers",
+        "kinboard: --pin",
+    ]
     assert "kinboard bench --html" in said[0]
-    assert all("KINBOARD_COMPUTE" in line for line in said[1:])
+    assert all("KINBOARD_COMPUTE" in line for line in said[2:5])
     assert given[0].port == 0
 
 
@@ -36,8 +40,8 @@ def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
 def test_one_fewer_compute_than_there_are_processors(
     monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], processes: int
 ) -> None:
-    monkeypatch.setattr("app.shared.settings.every_processor", lambda: frozenset(range(4)))
+    monkeypatch.setattr("app.shared.threads.processors", lambda: 4)
     assert Settings(**given).processes == processes
     assert Settings(**given).on_this_machine().processes == 0
-    monkeypatch.setattr("app.shared.settings.every_processor", lambda: frozenset([7]))
+    monkeypatch.setattr("app.shared.threads.processors", lambda: 1)
     assert Settings().processes == 1, "at least one"

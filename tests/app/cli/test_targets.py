@@ -196,7 +196,7 @@ def test_an_interrupted_run_goes_on_where_it_ended(tmp_path, monkeypatch, ending
         return answers(self, some)
 
     answers = targets.Question.answers
-    monkeypatch.setattr(targets, "every_processor", lambda: {0})
+    monkeypatch.setattr(targets, "processors", lambda: 1)
     monkeypatch.setattr(targets.Question, "answers", interrupted)
     out = tmp_path / f"out.{ending}"
     assert main([*words, str(out)]) == 130
