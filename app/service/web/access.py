@@ -12,13 +12,11 @@ one gets a cookie that opens the viewer, and nothing else, until the room ends.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import hashlib
 import hmac
 import html
 import re
-from collections import Counter
 from collections.abc import Awaitable, Callable
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
@@ -32,7 +30,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from app.api.problems import ProblemError, respond
-from app.service.web.rate_limit import TokenBucket
+from app.service.web.rate_limit import SlowTries, TokenBucket, too_many
 from app.shared.clients import client_of, is_here
 from app.shared.security import SAFE_METHODS, Rights, is_of_page, origin_allowed, set_cookie
 
@@ -94,7 +92,7 @@ class Access:
         self._read_only = read_only
         self._requests = TokenBucket(rate, 10.0 * rate) if rate else None
         self._wrong_tokens = TokenBucket(1.0 / TRY_EVERY, TRIES)
-        self._checks: Counter[str] = Counter()  # slow ones in progress, by client
+        self._slow = SlowTries(CHECKS)
         self._accepted = _encodings(token)
         self._login_page = login_page.read_text(encoding="utf-8")
 
@@ -190,20 +188,13 @@ class Access:
         """Raises 401 for a wrong token, 429 after too many; slow after too many, also for the right one."""
         client = client_of(scope)
         wait = self._wrong_tokens.wait(client)
+        refused = too_many("Too many wrong tokens from your address.", wait)
         if wait > 0.0:
-            if self._checks[client] >= CHECKS:
-                raise too_many("Too many wrong tokens from your address.", wait)
-            self._checks[client] += 1
-            try:
-                await asyncio.sleep(CHECK_TIME)
-            finally:
-                self._checks[client] -= 1
-                if not self._checks[client]:
-                    del self._checks[client]
+            await self._slow.pause(client, CHECK_TIME, refused)
         if any(hmac.compare_digest(given, accepted) for accepted in self._accepted):
             return
         if wait > 0.0:
-            raise too_many("Too many wrong tokens from your address.", wait)
+            raise refused
         self._wrong_tokens.take(client)
         raise unauthorized("The access token is wrong.")
 
@@ -293,14 +284,6 @@ class _LoginNeededError(Exception):
     """A browser without the token requests a page."""
 
 
-def too_many(detail: str, wait: float) -> ProblemError:
-    """429, with the time to wait."""
-    seconds = max(1, int(wait + 0.999))
-    return ProblemError(
-        429, "too-many-requests", detail, f"Try again in {seconds} s.", headers={"Retry-After": str(seconds)}
-    )
-
-
 def unauthorized(detail: str) -> ProblemError:
     """401, with a hint how to authenticate."""
     hint = "Send the header Authorization: Bearer TOKEN, or open /login in a browser."
@@ -308,10 +291,15 @@ def unauthorized(detail: str) -> ProblemError:
 
 
 async def form_of(request: Request) -> dict[str, str]:
-    """The fields of a form; raises 413 if it is too large."""
+    """The first value of each field of a form; raises 413 if it is too large."""
+    return {name: values[0] for name, values in (await fields_of(request, MAX_FORM)).items()}
+
+
+async def fields_of(request: Request, most: int) -> dict[str, list[str]]:
+    """The values of each field of a form; raises 413 if it has more bytes."""
     body = b""
     async for chunk in request.stream():
         body += chunk
-        if len(body) > MAX_FORM:
-            raise ProblemError(413, "body-too-large", f"The form is larger than {MAX_FORM} bytes.")
-    return {name: values[0] for name, values in parse_qs(body.decode("utf-8", "replace")).items()}
+        if len(body) > most:
+            raise ProblemError(413, "body-too-large", f"The form is larger than {most} bytes.")
+    return parse_qs(body.decode("utf-8", "replace"))

@@ -6,27 +6,24 @@ cookie of ours only: it ties a launch to the browser of its login.
 
 from __future__ import annotations
 
-import asyncio
 import html
 import json
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property
 from math import ceil
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
-from urllib.parse import parse_qs
+from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
+from anyio import CapacityLimiter, move_on_after, to_thread
 from itsdangerous import BadSignature, URLSafeTimedSerializer
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Ticket
 from app.classroom.clock import now
 from app.classroom.courses import Courses
-from app.service.web.access import pass_guest
+from app.service.web.access import fields_of, pass_guest
 from app.service.web.short_page import short_page
 from app.shared.security import PAGE_POLICY, set_cookie
 from app.shared.settings import Settings
@@ -44,8 +41,8 @@ MAX_FORM = 80_000  # bytes; tokens have up to 64 KiB
 # Launches have threads of their own: rooms and visitors do not wait behind them.
 THREADS, MOST_WAITING = 6, 200
 PATIENCE = 4.0  # s that a launch waits for a thread
-P = ParamSpec("P")
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 def lti_routes(hub: Hub, settings: Settings, courses: Callable[[], Courses]) -> list[BaseRoute]:
@@ -101,20 +98,14 @@ class _Threads:
     """Where launches wait for the database; a bounded number for a bounded time."""
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(THREADS, "kinboard-launch")
-        self._places = threading.Semaphore(MOST_WAITING)
+        self._free = CapacityLimiter(THREADS)
 
-    async def run(self, act: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+    async def run(self, act: Callable[[*Ts], T], *args: *Ts) -> T:
         """The result of a call in one of the threads; raises `_TooManyLaunchesError` if none is free in time."""
-        if not self._places.acquire(blocking=False):
-            raise _TooManyLaunchesError
-        job: Future[T] = self._pool.submit(act, *args, **kwargs)
-        job.add_done_callback(lambda _: self._places.release())
-        result = asyncio.wrap_future(job)
-        await asyncio.wait({result}, timeout=PATIENCE)
-        if job.cancel():
-            raise _TooManyLaunchesError
-        return await result
+        if self._free.statistics().tasks_waiting < MOST_WAITING:
+            with move_on_after(PATIENCE):  # ends the wait for a thread, and no call that has begun
+                return await to_thread.run_sync(act, *args, limiter=self._free)
+        raise _TooManyLaunchesError
 
 
 class _Pages:
@@ -169,7 +160,7 @@ class _Pages:
 
         asked: Mapping[str, str] = request.query_params
         if request.method == "POST":
-            asked = {name: values[0] for name, values in (await _form(request)).items()}
+            asked = {name: values[0] for name, values in (await fields_of(request, MAX_FORM)).items()}
         try:
             logins = await self._threads.run(self._begun)
             address, state = logins.begin(asked, f"{request.base_url}lti/launch")
@@ -188,7 +179,7 @@ class _Pages:
         from app.classroom.lti.keys import PlatformAway
         from app.classroom.lti.launches import LINK, LaunchRefused
 
-        form = {name: values[0] for name, values in (await _form(request)).items()}
+        form = {name: values[0] for name, values in (await fields_of(request, MAX_FORM)).items()}
         if form.get("error"):
             return refused(f"The platform refused the launch: {form['error'][:200]}.", 400)
         cookie = request.cookies.get(STATE_COOKIE, "")
@@ -254,7 +245,7 @@ class _Pages:
         from app.classroom.lti.platforms import origin_of
         from app.classroom.lti.services import link_answer
 
-        form = await _form(request)
+        form = await fields_of(request, MAX_FORM)
         signed = form.get("about", [""])[0]
         try:
             about = await self._threads.run(lambda: self._signer().loads(signed, max_age=CHOICE_TIME))
@@ -290,15 +281,6 @@ def _extent(content: Content) -> str:
         return ""
     many = content.most
     return f" <small>{many} exercise{'s' if many != 1 else ''}{'' if many else ', no score'}</small>"
-
-
-async def _form(request: Request) -> dict[str, list[str]]:
-    body = b""
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > MAX_FORM:
-            raise ProblemError(413, "body-too-large", f"The form is larger than {MAX_FORM} bytes.")
-    return parse_qs(body.decode("utf-8", "replace"))
 
 
 def refused(words: str, status: int, wait: float = 0.0) -> Response:

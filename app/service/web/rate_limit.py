@@ -1,10 +1,13 @@
-"""Rate limits per client: token buckets."""
+"""Rate limits per client: token buckets, and pauses before tries of those who have been wrong too often."""
 
 from __future__ import annotations
 
+import asyncio
 import time
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Callable
+
+from app.api.problems import ProblemError
 
 
 class TokenBucket:
@@ -39,3 +42,31 @@ class TokenBucket:
         now = self._clock()
         tokens, since = self._tokens.get(client, (self._burst, now))
         return min(self._burst, tokens + self._rate * (now - since)), now
+
+
+class SlowTries:
+    """Pauses before tries, of which a client may have so many at once. For one event loop."""
+
+    def __init__(self, at_once: int) -> None:
+        self._at_once = at_once
+        self._pausing: Counter[str] = Counter()
+
+    async def pause(self, client: str, seconds: float, refused: ProblemError) -> None:
+        """Wait for these seconds; raises the problem if too many tries of the client do."""
+        if self._pausing[client] >= self._at_once:
+            raise refused
+        self._pausing[client] += 1
+        try:
+            await asyncio.sleep(seconds)
+        finally:
+            self._pausing[client] -= 1
+            if not self._pausing[client]:
+                del self._pausing[client]
+
+
+def too_many(detail: str, wait: float) -> ProblemError:
+    """429, with the time to wait."""
+    seconds = max(1, int(wait + 0.999))
+    return ProblemError(
+        429, "too-many-requests", detail, f"Try again in {seconds} s.", headers={"Retry-After": str(seconds)}
+    )

@@ -7,13 +7,7 @@ still join, and a program that guesses needs centuries.
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-from collections import Counter
-from collections.abc import AsyncIterator
-
-from app.service.web.access import too_many
-from app.service.web.rate_limit import TokenBucket
+from app.service.web.rate_limit import SlowTries, TokenBucket, too_many
 
 WRONG, WRONG_EVERY = 30, 6.0  # wrong codes of one client at once, then one in this many seconds
 WRONG_ALL, WRONG_ALL_EVERY = 300, 0.5  # of all clients of this process
@@ -32,25 +26,13 @@ class Limits:
         self._wrong_all = TokenBucket(1.0 / WRONG_ALL_EVERY, WRONG_ALL)
         self._rooms = TokenBucket(1.0 / ROOMS_EVERY, ROOMS)
         self._seats = TokenBucket(1.0 / SEATS_EVERY, SEATS)
-        self._slow: Counter[str] = Counter()
+        self._slow = SlowTries(SLOW_AT_ONCE)
 
-    @contextlib.asynccontextmanager
-    async def trying(self, client: str) -> AsyncIterator[None]:
-        """One try of a code, slow after many wrong ones; raises 429."""
+    async def trying(self, client: str) -> None:
+        """One try of a code begins, after a pause if many were wrong; raises 429."""
         wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
-        if wait <= 0.0:
-            yield
-            return
-        if self._slow[client] >= SLOW_AT_ONCE:
-            raise too_many(TOO_MANY, wait)
-        self._slow[client] += 1
-        try:
-            await asyncio.sleep(SLOW)
-            yield
-        finally:
-            self._slow[client] -= 1
-            if not self._slow[client]:
-                del self._slow[client]
+        if wait > 0.0:
+            await self._slow.pause(client, SLOW, too_many(TOO_MANY, wait))
 
     def wrong(self, client: str) -> None:
         """A code was wrong; raises 429 if there were too many."""

@@ -129,14 +129,14 @@ class _Pages:
         if problem:
             return again(503, message=problem)
         try:
-            async with self._limits.trying(client):
-                self._limits.sitting(client)
-                try:
-                    ticket = await run_in_threadpool(self._hub.join, code, alias, known)
-                except UnknownRoomError:
-                    self._limits.wrong(client)
-                    raise
-                self._limits.sat(client)
+            await self._limits.trying(client)
+            self._limits.sitting(client)
+            try:
+                ticket = await run_in_threadpool(self._hub.join, code, alias, known)
+            except UnknownRoomError:
+                self._limits.wrong(client)
+                raise
+            self._limits.sat(client)
             room = await run_in_threadpool(self._hub.rooms.find, ticket)
         except RefusedError as error:
             return again(
