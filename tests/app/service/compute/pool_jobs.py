@@ -31,6 +31,18 @@ def hangs(_: Any) -> None:
     time.sleep(60)
 
 
+def begins_and_hangs(begun: str, _: Any) -> None:
+    """The same, after making a file."""
+    Path(begun).touch()
+    time.sleep(60)
+
+
+def is_late(_: Any) -> str:
+    """End after a time limit of less than a tenth of a second."""
+    time.sleep(0.1)
+    return "found"
+
+
 def goes_on(deadline: Any) -> None:
     """Compute until the deadline says that nobody waits, or that the time is over."""
     while True:
