@@ -44,7 +44,6 @@ class HttpProtocol(HttpToolsProtocol):
         self._ignored_upgrade = False  # the head offers another protocol, and is parsed again without that
         self._head = 0  # bytes of an incomplete head, without those that came with its beginning
         self._besides = 0  # bytes after the head that are neither body nor frames of chunks
-        self._trailers: list[int] = []  # bytes of each trailer field
         self._received = 0  # bytes since the message began
         self._since = 0.0  # when we began to wait for what the client is to send
         self._last = 0.0  # when it last sent something
@@ -127,11 +126,11 @@ class HttpProtocol(HttpToolsProtocol):
         if self._part == "body":
             self._besides = max(0, self._besides)
             if self._besides > MAX_HEAD:
-                self._refuse(_too_large(TRAILERS))
+                self._refuse(_too_large("Trailers and chunk extensions have", "", "Send them in the body."))
         elif self._part == "head":
             self._head += size if self._head >= 0 else 1
             if self._head > MAX_HEAD or len(self.headers) > MAX_HEADERS:
-                self._refuse(_too_large(HEAD))
+                self._refuse(_head_too_large())
 
     def _plain_head(self) -> bytes:
         """The head that was parsed, without the offer of another protocol, for which httptools skips its body."""
@@ -145,21 +144,17 @@ class HttpProtocol(HttpToolsProtocol):
             raise _PipelineFullError
         super().on_message_begin()
         self._part = "head"
-        self._head, self._received, self._trailers = -1, 0, []
+        self._head, self._received = -1, 0
         self._since = self.loop.time()
 
     def on_header(self, name: bytes, value: bytes) -> None:
         if self._part == "head":
             super().on_header(name, value)
-            return
-        self._trailers.append(len(name) + len(value) + 4)
-        if sum(self._trailers) > MAX_HEAD or len(self._trailers) > MAX_HEADERS:  # they may have come at once too
-            raise _too_large(TRAILERS)
 
     def on_headers_complete(self) -> None:
         size = len(self.url) + sum(len(name) + len(value) + 4 for name, value in self.headers)
         if size > MAX_HEAD or len(self.headers) > MAX_HEADERS:  # a whole head may have come at once
-            raise _too_large(HEAD)
+            raise _head_too_large()
         _check_head(self.parser.get_http_version(), self.parser.get_method(), self.url, self.headers)
         self._ignored_upgrade = self.parser.should_upgrade() and not self._should_upgrade()
         if not self._ignored_upgrade:
@@ -225,13 +220,13 @@ class _PipelineFullError(Exception):
     """A client sends requests faster than they are answered."""
 
 
-HEAD: Final = "The head of the request has", "Send fewer or shorter header fields."
-TRAILERS: Final = "Trailers and chunk extensions have", "Send them in the body."
+def _head_too_large() -> ProblemError:
+    fields = f" or {MAX_HEADERS} fields"
+    return _too_large("The head of the request has", fields, "Send fewer or shorter header fields.")
 
 
-def _too_large(what: tuple[str, str]) -> ProblemError:
-    detail = f"{what[0]} more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
-    return ProblemError(431, "head-too-large", detail, what[1])
+def _too_large(what: str, fields: str, hint: str) -> ProblemError:
+    return ProblemError(431, "head-too-large", f"{what} more than {MAX_HEAD} bytes{fields}.", hint)
 
 
 def _check_head(version: str, method: bytes, url: bytes, headers: Iterable[tuple[bytes, bytes]]) -> None:
