@@ -10,16 +10,16 @@ from app.shared.memory.process import resident_bytes
 from app.shared.metrics import HELD_BYTES, PENDING, PLACES, RESIDENT
 
 
-def update_gauges(state: Any, bridge: ViewerBridge, pool: Pool | None) -> None:
-    """Set the gauges to the present values; `state` is that of the application."""
-    PLACES.labels("requests").set(state.compute.used)
-    PLACES.labels("streams").set(state.streams.open)
-    PLACES.labels("viewer").set(bridge.slots.taken)
-    PENDING.labels("requests").set(state.compute.waiting)
-    PENDING.labels("summaries").set(state.summaries.pending)
-    PENDING.labels("maps").set(state.maps.pending)
-    PENDING.labels("clouds").set(state.clouds.pending)
-    HELD_BYTES.labels("answers").set(state.compute.memory.held)
-    HELD_BYTES.labels("clouds").set(state.clouds.bytes)
-    HELD_BYTES.labels("maps").set(state.maps.bytes)
-    RESIDENT.set(resident_bytes() + (0 if pool is None else pool.resident))
+def show_in_gauges(state: Any, bridge: ViewerBridge, pool: Pool | None) -> None:
+    """Have the gauges read the values of this application, whose `state` it is, whenever they are asked for."""
+    PLACES.labels("requests").set_function(lambda: state.compute.used)
+    PLACES.labels("streams").set_function(lambda: state.streams.open)
+    PLACES.labels("viewer").set_function(lambda: bridge.slots.taken)
+    PENDING.labels("requests").set_function(lambda: state.compute.waiting)
+    PENDING.labels("summaries").set_function(lambda: state.summaries.pending)
+    PENDING.labels("maps").set_function(lambda: state.maps.pending)
+    PENDING.labels("clouds").set_function(lambda: state.clouds.pending)
+    HELD_BYTES.labels("answers").set_function(lambda: state.compute.memory.held)
+    HELD_BYTES.labels("clouds").set_function(lambda: state.clouds.bytes)
+    HELD_BYTES.labels("maps").set_function(lambda: state.maps.bytes)
+    RESIDENT.set_function(lambda: resident_bytes() + (0 if pool is None else pool.resident))

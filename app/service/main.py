@@ -34,7 +34,7 @@ from app.exercises import ExerciseFileError, Exercises
 from app.live import Lines
 from app.service import status
 from app.service.compute.pool import Pool
-from app.service.gauges import update_gauges
+from app.service.gauges import show_in_gauges
 from app.service.log import guard_log
 from app.service.restarts import can_restart, restarted
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
@@ -126,7 +126,7 @@ def create_app(
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         startup.start()
-        (keeper := MemoryKeeper(idle, state.update_gauges)).start()
+        (keeper := MemoryKeeper(idle)).start()
         async with sweeping(classroom):
             yield
         keeper.stop()
@@ -139,7 +139,7 @@ def create_app(
     state.lines, state.tries, state.startup = lines, Limits(), startup
     state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
-    state.update_gauges = partial(update_gauges, state, bridge, pool)
+    show_in_gauges(state, bridge, pool)
     install_problem_handlers(app)
     complete_document(app, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])

@@ -53,8 +53,7 @@ class Readiness(BaseModel):
 
 
 @router.get("/metrics", summary="Metrics, for Prometheus", response_class=PlainTextResponse)
-async def metrics(request: Request) -> Response:
-    request.app.state.update_gauges()
+async def metrics() -> Response:
     return Response(exposition(), media_type=CONTENT_TYPE)
 
 

@@ -53,12 +53,10 @@ class MemoryKeeper:
 
     Args:
         idle: whether nobody would notice a pause of some ten milliseconds.
-        each: called at every look, for measurements.
     """
 
-    def __init__(self, idle: Callable[[], bool], each: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, idle: Callable[[], bool]) -> None:
         self._idle = idle
-        self._each = each
         self._least = 0  # bytes that were left after the last release
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="memory", daemon=True)
@@ -73,7 +71,6 @@ class MemoryKeeper:
 
     def look(self) -> None:
         """Give memory back if it is worthwhile."""
-        self._each()
         grown = resident_bytes() - self._least
         if grown < (IDLE_GROWTH if self._idle() else BUSY_GROWTH):
             return

@@ -4,14 +4,12 @@ import os
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from app.shared.clouds import FIRST, SAMPLED, Cloud, Clouds
 from app.shared.threads import NICENESS
-from kin import InputError
 from kin.files import classic_robots
 from kin.workspace import sample_workspace
 
@@ -67,21 +65,6 @@ def test_a_stream_is_the_cloud_in_order_whatever_the_slices(clouds, size):
     assert sum(len(s.q) for s in slices) == cloud.n
 
 
-def test_readers_of_one_part_share_one_computation(clouds, monkeypatch):
-    computed = []
-    slice_of = Cloud.slice
-
-    def counting(self, *args):
-        computed.append(args)
-        return slice_of(self, *args)
-
-    monkeypatch.setattr(Cloud, "slice", counting)
-    with ThreadPoolExecutor(16) as readers:
-        found = list(readers.map(lambda _: clouds.part(Cloud(ARM, 5000), 0).result(), range(64)))
-    assert len(computed) == 1
-    assert all(chunk is found[0] for chunk in found)
-
-
 def test_memory_is_bounded_and_what_was_dropped_comes_back():
     size = SAMPLED * 12
     clouds = Clouds(max_bytes=3 * size, threads=1)
@@ -94,14 +77,6 @@ def test_memory_is_bounded_and_what_was_dropped_comes_back():
     assert again is not first
     assert np.array_equal(again.points, first.points)
     assert clouds.part(cloud, cloud.parts - 1).result() is clouds.part(cloud, cloud.parts - 1).result()
-    clouds.close()
-
-
-def test_a_part_that_is_larger_than_the_memory_is_answered_and_not_kept():
-    clouds = Clouds(max_bytes=10, threads=1)
-    assert len(clouds.part(Cloud(ARM, 100), 0).result().points) == 100
-    assert clouds.bytes == 0
-    assert len(clouds._parts) == 0
     clouds.close()
 
 
@@ -123,16 +98,6 @@ def test_a_reader_that_leaves_cancels_the_computation(clouds, monkeypatch):
     assert count < 12
     time.sleep(0.1)
     assert len(began) == count
-
-
-def test_a_wrong_argument_raises_each_time_and_is_not_kept(clouds):
-    bad = Cloud(ARM, 100, seed=-1)
-    for _ in range(2):
-        with pytest.raises(InputError, match="seed"):
-            clouds.part(bad, 0).result()
-    with pytest.raises(InputError, match="seed"):
-        next(clouds.stream(bad))
-    assert (bad, 0) not in clouds._parts
 
 
 def test_threads_that_compute_step_back_behind_those_of_visitors(clouds):

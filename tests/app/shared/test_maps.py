@@ -12,7 +12,6 @@ from live_server import wait_for
 import kin
 from app.shared import mapreduce
 from app.shared.maps import MapRequest, Maps, MapTimeError
-from kin import InputError
 
 ARM = kin.get_robot("pioneer5")
 SMALL = MapRequest(ARM, 8, 12)
@@ -72,17 +71,6 @@ def test_a_map_is_that_of_the_core_with_limits_and_locks(maps):
     assert reader.latest is reader.future.result()
 
 
-def test_thirty_readers_share_one_computation_and_one_map(maps, slowly):
-    readers = [maps.subscribe(SMALL) for _ in range(30)]
-    slowly.let(10**6)
-    found = readers[0].future.result(60)
-    assert all(reader.future.result(60) is found for reader in readers)
-    assert slowly.begun == readers[0].total
-    for reader in readers:
-        reader.leave()
-    assert maps.subscribe(SMALL).future.result(0) is found, "kept for those who come later"
-
-
 def test_a_map_can_be_seen_while_it_grows(maps, slowly, monkeypatch):
     monkeypatch.setattr("app.shared.maps.PUBLISHED_EVERY", 0.0)
     reader = maps.subscribe(SEVERAL)
@@ -106,69 +94,6 @@ def test_a_map_that_takes_too_long_ends_and_shows_what_was_computed(slowly):
     assert len(reader.latest.index) > 0
     reader.leave()
     hurried.close()
-
-
-def test_only_the_last_reader_who_leaves_cancels_the_map(maps, slowly):
-    first, second = maps.subscribe(SEVERAL), maps.subscribe(SEVERAL)
-    slowly.let(1)
-    wait_for(lambda: first.done == 1)
-    first.leave()
-    first.leave()  # counted once
-    slowly.let(1)
-    wait_for(lambda: second.done == 2)
-    second.leave()
-    again = maps.subscribe(SEVERAL)
-    assert not again.finished
-    again.leave()
-
-    def over():
-        slowly.let(1)  # one by one: a thread may finish several before the collecting thread runs
-        return second.future.done()
-
-    wait_for(over)
-    with pytest.raises(CancelledError):
-        second.future.result(0)
-    assert second.done < second.total
-    assert slowly.begun < 2 * second.total, "of both"
-    assert maps.bytes == 0
-
-
-@pytest.mark.full
-def test_a_queued_map_can_be_cancelled(slowly):
-    maps = Maps(threads=1, at_once=1)
-    busy = maps.subscribe(SEVERAL)
-    waiting = maps.subscribe(SMALL)
-    wait_for(lambda: slowly.begun == 1)
-    assert waiting.total == 0
-    waiting.leave()
-    assert waiting.future.cancelled()
-    slowly.let(10**6)
-    busy.future.result(60)
-    maps.close()
-
-
-def test_memory_is_bounded_and_the_least_recently_used_map_is_evicted():
-    first, second, third = (MapRequest(ARM, n, 12) for n in (6, 7, 8))
-    roomy = Maps(threads=1)
-    for wanted in (first, second, third):
-        roomy.subscribe(wanted).future.result(60)
-    room = roomy.bytes - 1
-    roomy.close()
-    maps = Maps(max_bytes=room, threads=1)
-    maps.subscribe(second).future.result(60)
-    kept = maps.subscribe(first).future.result(60)
-    maps.subscribe(third).future.result(60)
-    wait_for(lambda: 0 < maps.bytes <= room)
-    assert maps.subscribe(first).latest is kept
-    assert second not in maps._maps
-    maps.close()
-
-
-def test_an_invalid_request_fails_for_every_caller_and_is_not_cached(maps):
-    for _ in range(2):
-        with pytest.raises(InputError, match="directions"):
-            maps.subscribe(MapRequest(ARM, 8, 13)).future.result(20)
-        wait_for(lambda: len(maps._maps) == 0)
 
 
 def test_closing_cancels_computations(maps, slowly):

@@ -84,7 +84,7 @@ def test_memory_is_given_back_when_it_has_grown_and_sooner_when_idle(monkeypatch
 def test_the_thread_looks_until_it_is_stopped(monkeypatch):
     monkeypatch.setattr(memory, "INTERVAL", 0.01)
     looks: list[int] = []
-    keeper = MemoryKeeper(lambda: False, lambda: looks.append(1))
+    keeper = MemoryKeeper(lambda: bool(looks.append(1)))
     keeper.start()
     wait_for(lambda: len(looks) > 2)
     keeper.stop()

@@ -11,7 +11,6 @@ import pytest
 import kin
 from app.shared.computations import TooManyPendingError
 from app.shared.summaries import Summaries
-from kin import InputError
 
 ARM = kin.get_robot("pioneer5")
 LOCKED = (None, None, None, None, 0.5)
@@ -42,12 +41,6 @@ def test_equal_requests_share_one_result_and_others_do_not(summaries):
     cut = summaries.section(ARM, resolution=16).future.result(60)
     assert summaries.section(ARM, resolution=16).future.result(0) is cut
     assert summaries.section(ARM, resolution=17).future.result(60) is not cut
-
-
-def test_invalid_requests_raise_each_time(summaries):
-    for _ in range(2):
-        with pytest.raises(InputError, match="effort"):
-            summaries.facts(ARM, effort=1).future.result(60)
 
 
 def test_a_comparison_ends_when_nobody_waits_for_it(summaries):
