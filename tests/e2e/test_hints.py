@@ -193,7 +193,12 @@ def test_cover_says_why_a_page_waits(browser: Browser, address: str) -> None:
     assert "compiles" in page.evaluate("getComputedStyle(document.documentElement, '::after').content")
     page.clock.fast_forward(60_000)
     expect(page.locator("html")).to_have_attribute("data-kb-cover", "light")
+    page.evaluate("document.documentElement.dataset.kbPreparing = 'Preparing the UR5: step 1 of 9.'")
+    assert "the UR5: step 1 of 9" in page.evaluate("getComputedStyle(document.documentElement, '::after').content")
     page.clock.fast_forward(61_000)
+    expect(page.locator("html")).to_have_attribute("data-kb-cover", "light")
+    page.evaluate("delete document.documentElement.dataset.kbPreparing")
+    page.clock.fast_forward(121_000)
     expect(page.locator("html")).not_to_have_attribute("data-kb-cover", "light")
     page.close()
 
