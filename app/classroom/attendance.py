@@ -195,9 +195,9 @@ class Attendance:
         self._live.report(page, own, **state)
 
     def _only_teacher(self) -> None:
-        if self.ticket.seat:
+        if not self.ticket.teaches:
             raise PermissionError("only the teacher may do this")
 
     def _only_student(self) -> None:
-        if not self.ticket.seat:
+        if self.ticket.teaches:
             raise PermissionError("only a student may do this")

@@ -6,7 +6,6 @@ import secrets
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 
 from app.classroom.work import ANSWER_SHOWN, Work
 
@@ -44,13 +43,6 @@ class UnknownRoomError(RefusedError):
     """There is no room with this code, or it has ended."""
 
 
-class Role(Enum):
-    """Whom a ticket admits."""
-
-    TEACHER = "teacher"
-    STUDENT = "student"
-
-
 @dataclass(frozen=True)
 class Ticket:
     """Whom a verified token admits to which room: its teacher, or the student of one seat."""
@@ -59,9 +51,9 @@ class Ticket:
     seat: str = ""
 
     @property
-    def role(self) -> Role:
-        """The teacher has no seat."""
-        return Role.STUDENT if self.seat else Role.TEACHER
+    def teaches(self) -> bool:
+        """Whether it is the teacher's, who has no seat."""
+        return not self.seat
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Hashable
 from typing import Any
 
-from app.classroom.views import Role, Ticket
+from app.classroom.views import Ticket
 from app.viewer.panel.part import add_html
 from app.viewer.room.member import NEWS, Member
 from app.viewer.room.member_page import MemberPage
@@ -20,7 +20,7 @@ class ClassroomPage(MemberPage):
 
     def __init__(self, *arguments: Any, ticket: Ticket, **options: Any) -> None:
         super().__init__(*arguments, ticket=ticket, **options)
-        self.offered = (*self.offered, Teacher if ticket.role is Role.TEACHER else Student)
+        self.offered = (*self.offered, Teacher if ticket.teaches else Student)
         self._member: Member | None = None
 
     # Worker

@@ -14,7 +14,7 @@ from starlette.responses import Response, StreamingResponse
 from starlette.types import Send
 
 from app.api.problems import ProblemError
-from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
+from app.classroom import COOKIE, ClassroomUnavailable, Hub
 from app.classroom.clock import now
 from app.classroom.courses import Courses, SentExercises
 from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, pairs_of
@@ -113,7 +113,7 @@ class Results:
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""
         ticket = self._hub.ticket(token)
-        room = self._hub.rooms.find(ticket) if ticket is not None and ticket.role is Role.TEACHER else None
+        room = self._hub.rooms.find(ticket) if ticket is not None and ticket.teaches else None
         if room is None:
             raise ProblemError(
                 403, "forbidden", "Only the teacher may see the results.", "Open the teacher's link."

@@ -17,7 +17,7 @@ from starlette.responses import RedirectResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from app.api.problems import ProblemError
-from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Role, Ticket, UnknownRoomError
+from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Ticket, UnknownRoomError
 from app.classroom.clock import now
 from app.classroom.courses import Courses
 from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
@@ -84,7 +84,7 @@ class _Pages:
             return answer
         if code and read_code(code) != room.code:
             return room_page(request, code=code, may_open=may_open(request.scope))  # an invitation to another room
-        return self._room_of(request, room, teacher=ticket.role is Role.TEACHER)
+        return self._room_of(request, room, teacher=ticket.teaches)
 
     def _room_of(self, request: Request, room: OpenRoom, message: str = "", teacher: bool = False) -> Response:
         """The page of a room, for who is in it."""
@@ -159,8 +159,7 @@ class _Pages:
         """The teacher's link."""
         try:
             ticket = await run_in_threadpool(self._hub.ticket, request.path_params["token"][: LONGEST_TOKEN + 1])
-            valid = ticket is not None and ticket.role is Role.TEACHER
-            room = await run_in_threadpool(self._hub.rooms.find, ticket) if ticket and valid else None
+            room = await run_in_threadpool(self._hub.rooms.find, ticket) if ticket and ticket.teaches else None
         except ClassroomUnavailable as error:
             return room_page(request, 503, message=str(error))
         if ticket is None or room is None:
@@ -197,7 +196,7 @@ class _Pages:
         ticket, problem = await self._ticket(request)
         if problem:
             return room_page(request, 503, message=problem)
-        if ticket is None or ticket.role is not Role.TEACHER:
+        if ticket is None or not ticket.teaches:
             raise ProblemError(403, "forbidden", "Only the teacher may end the room.", "Open the teacher's link.")
         try:
             await run_in_threadpool(self._hub.rooms.end, ticket.room)
