@@ -4,7 +4,7 @@ On Linux the service is a copy of that process, made before any thread was start
 without importing anything, and with the robots, exercises and listening socket that the first one had: new
 connections wait meanwhile. Elsewhere the service is one process, and the operating system's supervisor starts it.
 
-A service whose event loop makes no step for a while ends itself (`Watchdog`). The C library's timer of
+A service whose event loop makes no step for a while ends itself (`end_after`). The C library's timer of
 `faulthandler` does that, so it works even if a computation never gives the interpreter back; it writes where each
 thread was.
 """
@@ -136,25 +136,11 @@ def _say(pipe: int) -> None:
     os.close(pipe)
 
 
-class Watchdog:
-    """Ends this process if `look` is not called for some seconds, and writes where its threads were.
-
-    Args:
-        seconds: of silence.
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds = seconds
-
-    def look(self) -> None:
-        """All is well."""
-        file: IO[str] | None = sys.__stderr__
-        if file is not None:
-            faulthandler.dump_traceback_later(self._seconds, exit=True, file=file)
-
-    def stop(self) -> None:
-        """Watch no more."""
-        faulthandler.cancel_dump_traceback_later()
+def end_after(seconds: float) -> None:
+    """End this process after so many seconds, and write where its threads were, unless this is called again."""
+    file: IO[str] | None = sys.__stderr__
+    if file is not None:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
 
 
 def is_orphan() -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import faulthandler
 import ipaddress
 import logging
 import os
@@ -22,7 +23,7 @@ from fastapi import FastAPI
 
 from app.service import uvicorn_names
 from app.service.guard import Guard, GuardedConfig
-from app.service.restarts import Watchdog, is_orphan
+from app.service.restarts import end_after, is_orphan
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
 from app.shared.settings import Settings
@@ -102,7 +103,7 @@ class Server(uvicorn.Server):
         self._end_work = app.state.compute.close
         self._drain = settings.drain
         self._on_start = on_start
-        self._watchdog = None if alone else Watchdog(settings.worker_timeout)
+        self._alone, self._silence = alone, settings.worker_timeout
         self._deadline: threading.Timer | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -123,8 +124,8 @@ class Server(uvicorn.Server):
 
     async def on_tick(self, counter: int) -> bool:
         """Called ten times a second."""
-        if self._watchdog is not None and counter % 10 == 0:
-            self._watchdog.look()
+        if not self._alone and counter % 10 == 0:
+            end_after(self._silence)
             if is_orphan():
                 os.kill(os.getpid(), signal.SIGTERM)
         return await super().on_tick(counter)
@@ -143,8 +144,8 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         asyncio.get_running_loop().call_later(self._drain - min(1.0, 0.5 * self._drain), self._end_work)
-        if self._watchdog is not None:
-            self._watchdog.stop()
+        if not self._alone:
+            faulthandler.cancel_dump_traceback_later()
         await super().shutdown(sockets=sockets)
 
 

@@ -100,7 +100,7 @@ def stopped(process: subprocess.Popen[str], within: float) -> str:
 
 
 def test_a_stop_completes_answers_in_progress_and_notifies_visitors():
-    with service(KINBOARD_DRAIN="30") as (process, base):
+    with service(KINBOARD_DRAIN="30", KINBOARD_WORKER_TIMEOUT="2") as (process, base):  # which ends with the loop
         asking = Asking(base, "panda", "ik", {"target": [FAR] * 600, "max_solutions": 1})
         with connect(f"ws://{base}/viewer", subprotocols=[f"viser-v{viser.__version__}"], proxy=None) as visitor:
             assert visitor.recv(timeout=20)

@@ -101,15 +101,9 @@ def test_a_service_knows_when_the_process_that_started_it_is_killed():
 )
 def test_one_that_hangs_ends_itself_and_says_where(hang):
     done = run(
-        "say()\nif not first:\n    stop_all()\nwatchdog = restarts.Watchdog(0.1)\nfor _ in range(3):\n"
-        f"    watchdog.look()\n    time.sleep(0.05)\n{hang}"
+        "say()\nif not first:\n    stop_all()\nfor _ in range(3):\n"
+        f"    restarts.end_after(0.1)\n    time.sleep(0.05)\n{hang}"
     )
     assert done.returncode == 0
     assert "has ended with code 1 and is started again now" in done.stderr
     assert re.search(r'File "<string>", line \d+ in serve', done.stderr)
-
-
-def test_one_that_stops_in_order_is_not_watched():
-    watched = "watchdog = restarts.Watchdog(0.1)\nwatchdog.look()\nwatchdog.stop()"
-    done = run(f"say()\n{watched}\ntime.sleep(0.3)\nstop_all()")
-    assert (done.returncode, done.stderr) == (0, "")
