@@ -1,1 +1,1 @@
-"""The running service: application, start-up and worker processes."""
+"""The running service: application, start-up, and processes that compute and compile."""

@@ -2,9 +2,9 @@
 
 Without a token everybody has full access, which is right on one's own machine. With a token, programs send it
 with each request (``Authorization: Bearer …``). A browser is redirected to a login page that asks for it once
-and sets a signed cookie (itsdangerous). The cookie holds only the time of the login, so any worker process can
-check it. In read-only mode visitors without the token may look but not move anything: pages, descriptions of
-robots, and a viewer whose arm takes no commands.
+and sets a signed cookie (itsdangerous), which holds only the time of the login. In read-only mode visitors
+without the token may look but not move anything: pages, descriptions of robots, and a viewer whose arm takes no
+commands.
 
 Health checks, the files of the login page, and the pages for joining a classroom are always open. Who has joined
 one gets a cookie that opens the viewer, and nothing else, until the room ends.
