@@ -113,8 +113,8 @@ class ComputeSlots:
         client, slots = client_of(request.scope), self._processes if process else self._slots
         with self.watched(request) as deadline:
             await self._acquire(slots, client, deadline, "computed")
-            with Slot(slots, client) as slot:
-                deadline.start(slot)
+            with Slot(slots, client):
+                deadline.start()
                 yield deadline
 
     async def read(self, request: Request, validated: Callable[[], T]) -> T:
@@ -185,18 +185,16 @@ class ComputeSlots:
 
 
 class Deadline:
-    """The time limit of one request, and its slot if it has one. Any thread may call `check`."""
+    """The time limit of one request. Any thread may call `check`."""
 
     def __init__(self, work: ComputeSlots) -> None:
-        self.slot: Slot | None = None
         self.on_left: Callable[[], None] | None = None  # called by the event loop when the client leaves
         self._work = work
         self._left = False
         self.start()
 
-    def start(self, slot: Slot | None = None, left: float | None = None) -> None:
+    def start(self, left: float | None = None) -> None:
         """The time of the request begins now, or ends in `left` seconds."""
-        self.slot = slot
         self._ends = time.monotonic() + (self._work.seconds if left is None else left)
 
     @property

@@ -181,11 +181,6 @@ class Attendance:
         self._only_teacher()
         self._rooms.end(self.ticket.room)
 
-    def teacher_token(self) -> str:
-        """What the teacher's link holds."""
-        self._only_teacher()
-        return self._rooms.tokens.sign(self.ticket)
-
     def _report(self, **columns: object) -> None:
         self._only_student()
         self._live.report_seat(self.ticket.seat, **columns)

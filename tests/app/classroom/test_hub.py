@@ -193,7 +193,6 @@ TEACHERS = {
     "remove_unseen": (),
     "rename_seat": ("x", "y"),
     "end_room": (),
-    "teacher_token": (),
 }
 STUDENTS = {
     "secret": (),
