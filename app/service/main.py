@@ -42,10 +42,9 @@ from app.service.startup import Startup
 from app.service.web.access import Access
 from app.service.web.embedding import embedding_routes
 from app.service.web.failures import Failures
-from app.service.web.hosts import LOCAL_NAMES, Hosts
+from app.service.web.hosts import LOCAL_NAMES, Hosts, Preflights
 from app.service.web.lti import PlatformsRefused, check_platforms, lti_routes
 from app.service.web.observe import Observe, write_to_stderr
-from app.service.web.origins import Preflights
 from app.service.web.pages import page_routes
 from app.service.web.prefix import PathPrefix, clean_prefix
 from app.service.web.rooms import room_routes, sweeping

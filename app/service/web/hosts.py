@@ -1,4 +1,4 @@
-"""Which host a request is for, and hints about proxies.
+"""Which host a request is for, hints about proxies, and why a page of another origin cannot read our answers.
 
 A page of another site can have its name resolve to our address (DNS rebinding). The browser then takes us for a
 part of that site and lets its scripts read our answers. But the request still names that host. So a service
@@ -12,6 +12,7 @@ import logging
 from collections.abc import Iterable
 from functools import lru_cache
 
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
@@ -81,3 +82,36 @@ def wrong_host(host: str) -> ProblemError:
     detail = f"This service is not {shorten_text(host)}."
     hint = "Use localhost or its IP address, or ask the operator to add the name to KINBOARD_ALLOWED_HOSTS."
     return ProblemError(421, "wrong-host", detail, hint)
+
+
+class Preflights:
+    """ASGI middleware that refuses preflights of origins that may not read answers.
+
+    Before a page of another origin sends a request with a JSON body or a token, its browser asks whether it may:
+    ``OPTIONS`` with ``Access-Control-Request-Method``. Origins that the operator has named get an answer from
+    Starlette's middleware. All others get a refusal that says which setting names them: the page's author finds it
+    in the network tab of the browser.
+
+    Args:
+        allowed: the origins that may; ``*``: all.
+    """
+
+    def __init__(self, app: ASGIApp, allowed: Iterable[str]) -> None:
+        self.app = app
+        self._allowed = frozenset(allowed)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and scope["method"] == "OPTIONS" and "*" not in self._allowed:
+            headers = Headers(scope=scope)
+            origin = headers.get("origin")
+            if origin is not None and "access-control-request-method" in headers and origin not in self._allowed:
+                await respond(other_origin(origin))(scope, receive, send)
+                return
+        await self.app(scope, receive, send)
+
+
+def other_origin(origin: str) -> ProblemError:
+    """403 naming the origin, and the setting that would let it in."""
+    detail = f"Pages of {shorten_text(origin)} may not read answers of this service."
+    hint = "Ask the operator to add this origin to KINBOARD_CORS_ORIGINS, a JSON list such as "
+    return ProblemError(403, "other-origin", detail, hint + '["https://school.example"].')
