@@ -18,8 +18,9 @@ from starlette.requests import Request
 
 import kin
 from app.api import ik
+from app.api.batches import Batch, one_or_all
 from app.api.problems import ProblemError
-from app.api.work import ComputeSlots
+from app.api.work import ComputeSlots, Deadline, TooSlowError
 from app.service.main import create_app
 from app.shared.settings import Settings
 
@@ -72,6 +73,16 @@ def test_targets_checked_in_time_are_returned_with_a_problem():
     document = answer.json()
     assert 0 < len(document["results"]) < 10_000
     assert document["problem"]["type"] == "urn:kinboard:problem:too-slow"
+
+
+def test_few_results_are_lost_to_the_target_that_takes_too_long():
+    def answers(some: slice) -> list[object]:
+        if some.stop > 4:
+            raise TooSlowError(30.0, "")
+        return [{"n": n} for n in range(100)[some]]
+
+    response = one_or_all(answers, Batch("target", 100, False, 10), Deadline(ComputeSlots(1, 30.0)), partly=True)
+    assert [each["n"] for each in json.loads(response.body)["results"]] == [0, 1, 2]
 
 
 def test_a_summary_that_took_too_long_is_cached_for_the_next_request(hurried, monkeypatch):
