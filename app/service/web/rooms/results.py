@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("kinboard.classroom")
 
 MOST = 400  # rows on the screen; the file has all attempts
+CSV = "text/csv; charset=utf-8"
 
 
 class Results:
@@ -38,14 +39,15 @@ class Results:
     def __init__(self, hub: Hub, courses: Callable[[], Courses]) -> None:
         self._hub, self._courses = hub, courses
 
+    @staticmethod
+    def away(request: Request, why: str) -> Response:
+        """The page while the database is away."""
+        return results_page(request, 503, problem=why)
+
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
-        try:
-            room, sent, table, attempts, compared = await run_in_threadpool(
-                self._read, request.cookies.get(COOKIE, "")
-            )
-        except ClassroomUnavailable as error:
-            return results_page(request, 503, problem=str(error))
+        token = request.cookies.get(COOKIE, "")
+        room, sent, table, attempts, compared = await run_in_threadpool(self._read, token)
         shown = await run_in_threadpool(lambda: _rows(self._known(sent), table[:MOST]))
         states = ("stuck", "gave up", "not begun", "at it", "solved", "has not come")
         counted = [row for row in table if not sent.task or row.exercise == sent.task]
@@ -67,33 +69,19 @@ class Results:
         """One row per attempt; what has been read is sent before more is."""
         from app.classroom.results.store import pages_of, sent_to
 
-        try:
-            room = await run_in_threadpool(self._room, request.cookies.get(COOKIE, ""))
-            pages = pages_of(self._hub.database, room.id)
-            first: list[Attempt] = await run_in_threadpool(next, pages, [])
-            sent = await run_in_threadpool(sent_to, self._hub.database, room.id)
-        except ClassroomUnavailable as error:
-            raise ProblemError(503, "busy", str(error)) from None
+        room = await run_in_threadpool(self._room, request.cookies.get(COOKIE, ""))
+        pages = pages_of(self._hub.database, room.id)
+        first: list[Attempt] = await run_in_threadpool(next, pages, [])
+        sent = await run_in_threadpool(sent_to, self._hub.database, room.id)
         titles = await run_in_threadpool(lambda: self._known(sent).titles)
-        headers = {
-            "content-disposition": f'attachment; filename="results-{room.code.lower()}.csv"',
-            "cache-control": "no-store",
-        }
         texts = csv_of(chain([first], pages), titles)
-        return _Download(_encoded(texts), media_type="text/csv; charset=utf-8", headers=headers)
+        return _Download(_encoded(texts), media_type=CSV, headers=_as_file("results", room))
 
     async def download_gains(self, request: Request) -> Response:
         """A row for each pair of exercises and student, and for the class."""
-        try:
-            room, _, _, _, (pairs, found) = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
-        except ClassroomUnavailable as error:
-            raise ProblemError(503, "busy", str(error)) from None
-        headers = {
-            "content-disposition": f'attachment; filename="gains-{room.code.lower()}.csv"',
-            "cache-control": "no-store",
-        }
+        room, _, _, _, (pairs, found) = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
         text = csv_of_gains(found, pairs)
-        return Response(codecs.BOM_UTF8 + text.encode(), media_type="text/csv; charset=utf-8", headers=headers)
+        return Response(codecs.BOM_UTF8 + text.encode(), media_type=CSV, headers=_as_file("gains", room))
 
     def _read(self, token: str) -> tuple[OpenRoom, Sent, list[Row], int, tuple[list[Pair], list[Gains]]]:
         """The room of the teacher's cookie, what it was sent, its table, how many attempts, what is compared.
@@ -123,6 +111,12 @@ class Results:
     def _known(self, sent: Sent) -> SentExercises:
         courses = self._courses()
         return SentExercises(courses.exercises, sent.own, courses.find)
+
+
+def _as_file(name: str, room: OpenRoom) -> dict[str, str]:
+    """Header fields of a file."""
+    file = f"{name}-{room.code.lower()}.csv"
+    return {"content-disposition": f'attachment; filename="{file}"', "cache-control": "no-store"}
 
 
 def _rows(known: SentExercises, table: Iterable[Row]) -> list[dict[str, object]]:

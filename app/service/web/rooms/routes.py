@@ -7,7 +7,7 @@ cookie is not sent with requests that other sites make, and forms are only accep
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -34,6 +34,8 @@ from kin.files.numbers import number_of
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
 
+Page = Callable[[Request], Awaitable[Response]]
+
 ASK_ERASED = 3  # seconds until the page asks again whether an ended room is erased
 
 
@@ -44,18 +46,42 @@ def room_routes(
     results = Results(hub, courses)
     pages = _Pages(hub, settings.allowed_origins, bool(settings.frame_ancestors), limits or Limits())
     return [
-        Route("/room", pages.show, methods=["GET"], name="room"),
+        Route("/room", _in_words(pages.show, _away), methods=["GET"], name="room"),
         Route("/room", pages.open, methods=["POST"]),
         Route("/room/join", pages.join, methods=["POST"]),
-        Route("/room/teach/{token}", pages.teach, methods=["GET"]),
-        Route("/room/qr.svg", pages.qr, methods=["GET"]),
-        Route("/room/results", results.show, methods=["GET"]),
-        Route("/room/results.csv", results.download, methods=["GET"]),
-        Route("/room/gains.csv", results.download_gains, methods=["GET"]),
+        Route("/room/teach/{token}", _in_words(pages.teach, _away), methods=["GET"]),
+        Route("/room/qr.svg", _in_words(pages.qr, _busy), methods=["GET"]),
+        Route("/room/results", _in_words(results.show, results.away), methods=["GET"]),
+        Route("/room/results.csv", _in_words(results.download, _busy), methods=["GET"]),
+        Route("/room/gains.csv", _in_words(results.download_gains, _busy), methods=["GET"]),
         Route("/room/leave", pages.leave, methods=["POST"]),
-        Route("/room/end", pages.end, methods=["POST"]),
-        Route("/room/ended", pages.ended, methods=["GET"]),
+        Route("/room/end", _in_words(pages.end, _away), methods=["POST"]),
+        Route("/room/ended", _in_words(pages.ended, _away), methods=["GET"]),
     ]
+
+
+def _in_words(page: Page, away: Callable[[Request, str], Response]) -> Page:
+    """A page that says what is wrong with the database while that is away."""
+
+    async def said(request: Request) -> Response:
+        try:
+            return await page(request)
+        except ClassroomUnavailable as error:
+            return away(request, str(error))
+
+    return said
+
+
+def _away(request: Request, why: str) -> Response:
+    return room_page(request, 503, code=_code_in(request), may_open=may_open(request.scope), message=why)
+
+
+def _busy(_: Request, why: str) -> Response:
+    raise ProblemError(503, "busy", why)
+
+
+def _code_in(request: Request) -> str:
+    return show_code(read_code(request.query_params.get("code", "")[:20]))
 
 
 class _Pages:
@@ -67,16 +93,10 @@ class _Pages:
 
     async def show(self, request: Request) -> Response:
         """The room of this browser; else the forms for joining and opening one."""
-        code = show_code(read_code(request.query_params.get("code", "")[:20]))
-        ticket, problem = await self._ticket(request)
-        if ticket is None or problem:
-            return room_page(
-                request, 503 if problem else 200, code=code, may_open=may_open(request.scope), message=problem
-            )
-        try:
-            room = await run_in_threadpool(self._hub.rooms.find, ticket)
-        except ClassroomUnavailable as error:
-            return room_page(request, 503, code=code, message=str(error))
+        code, ticket = _code_in(request), await self._ticket(request)
+        if ticket is None:
+            return room_page(request, code=code, may_open=may_open(request.scope))
+        room = await run_in_threadpool(self._hub.rooms.find, ticket)
         if room is None:
             words = "Your room has ended, or the teacher has removed you." if not code else ""
             answer = room_page(request, code=code, may_open=may_open(request.scope), message=words)
@@ -125,10 +145,8 @@ class _Pages:
         form, client = await self._form(request), client_of(request.scope)
         code, alias = form.get("code", "")[:40], form.get("alias", "")[:200]
         again = partial(room_page, request, code=code, alias=alias, may_open=may_open(request.scope))
-        known, problem = await self._ticket(request)
-        if problem:
-            return again(503, message=problem)
         try:
+            known = await self._ticket(request)
             await self._limits.trying(client)
             self._limits.sitting(client)
             try:
@@ -157,11 +175,8 @@ class _Pages:
 
     async def teach(self, request: Request) -> Response:
         """The teacher's link."""
-        try:
-            ticket = await run_in_threadpool(self._hub.ticket, request.path_params["token"][: LONGEST_TOKEN + 1])
-            room = await run_in_threadpool(self._hub.rooms.find, ticket) if ticket and ticket.teaches else None
-        except ClassroomUnavailable as error:
-            return room_page(request, 503, message=str(error))
+        ticket = await run_in_threadpool(self._hub.ticket, request.path_params["token"][: LONGEST_TOKEN + 1])
+        room = await run_in_threadpool(self._hub.rooms.find, ticket) if ticket and ticket.teaches else None
         if ticket is None or room is None:
             words = "This link for a teacher is not valid: its room has ended, or the link is not complete."
             return room_page(request, 404, message=words, may_open=may_open(request.scope))
@@ -171,13 +186,8 @@ class _Pages:
 
     async def qr(self, request: Request) -> Response:
         """The address for joining as a QR code, for who is in the room."""
-        try:
-            ticket, problem = await self._ticket(request)
-            if problem:
-                raise ProblemError(503, "busy", problem)
-            room = None if ticket is None else await run_in_threadpool(self._hub.rooms.find, ticket)
-        except ClassroomUnavailable as error:
-            raise ProblemError(503, "busy", str(error)) from None
+        ticket = await self._ticket(request)
+        room = None if ticket is None else await run_in_threadpool(self._hub.rooms.find, ticket)
         if room is None:
             raise ProblemError(404, "not-found", "You are not in a room.", "Open or join one at /room.")
         picture = qr_svg(join_address(request, room.code))
@@ -193,15 +203,10 @@ class _Pages:
     async def end(self, request: Request) -> Response:
         """End the room and erase everything in it."""
         await self._form(request)
-        ticket, problem = await self._ticket(request)
-        if problem:
-            return room_page(request, 503, message=problem)
+        ticket = await self._ticket(request)
         if ticket is None or not ticket.teaches:
             raise ProblemError(403, "forbidden", "Only the teacher may end the room.", "Open the teacher's link.")
-        try:
-            await run_in_threadpool(self._hub.rooms.end, ticket.room)
-        except ClassroomUnavailable as error:
-            return room_page(request, 503, message=str(error))
+        await run_in_threadpool(self._hub.rooms.end, ticket.room)
         answer = await self.ended(request)
         self._forget(request, answer)
         return answer
@@ -210,10 +215,7 @@ class _Pages:
         """What is true of rooms that have ended; the page asks again while something of them is left."""
         if not self._hub.in_use:
             return room_page(request, may_open=may_open(request.scope))
-        try:
-            words = await run_in_threadpool(lambda: self._hub.rooms.said_of_ended())
-        except ClassroomUnavailable as error:
-            return room_page(request, 503, message=str(error))
+        words = await run_in_threadpool(lambda: self._hub.rooms.said_of_ended())
         answer = room_page(request, message=words, may_open=may_open(request.scope))
         if words == ERASING:
             answer.headers["refresh"] = f"{ASK_ERASED}; url=ended"
@@ -226,15 +228,10 @@ class _Pages:
             )
         return await form_of(request)
 
-    async def _ticket(self, request: Request) -> tuple[Ticket | None, str]:
-        """The ticket in the cookie, and what is wrong with the database."""
+    async def _ticket(self, request: Request) -> Ticket | None:
+        """The ticket in the cookie; raises `ClassroomUnavailable`."""
         token = request.cookies.get(COOKIE, "")
-        if not token:
-            return None, ""
-        try:
-            return await run_in_threadpool(self._hub.ticket, token), ""
-        except ClassroomUnavailable as error:
-            return None, str(error)
+        return await run_in_threadpool(self._hub.ticket, token) if token else None
 
     async def _remember(self, request: Request, answer: Response, ticket: Ticket, room: OpenRoom) -> None:
         token, left = await run_in_threadpool(self._hub.rooms.tokens.cookie, ticket, room.code), room.ends - now()
