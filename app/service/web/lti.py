@@ -90,8 +90,11 @@ def check_platforms(settings: Settings) -> None:
         raise PlatformsRefused(f"KINBOARD_LTI: {error}") from None
 
 
-class _TooManyLaunchesError(Exception):
-    """More launches wait than may."""
+class _TooManyLaunchesError(ClassroomUnavailable):
+    """More launches come in than the database takes."""
+
+    def __init__(self) -> None:
+        super().__init__("Too many users of learning platforms arrive at the moment.")
 
 
 class _Threads:
@@ -166,10 +169,8 @@ class _Pages:
             address, state = logins.begin(asked, f"{request.base_url}lti/launch")
         except LaunchRefused as error:
             return refused(str(error), 400)
-        except _TooManyLaunchesError:
-            return busy()
         except ClassroomUnavailable as error:
-            return refused(str(error), 503)
+            return unavailable(error)
         answer = RedirectResponse(address, 303, headers={"cache-control": "no-store"})
         set_cookie(answer, STATE_COOKIE, state, 600, request.scope, framed=True)
         return answer
@@ -193,10 +194,8 @@ class _Pages:
             return refused(str(error), 403)
         except PlatformAway as error:
             return refused(str(error), 503, error.wait)
-        except _TooManyLaunchesError:
-            return busy()
         except ClassroomUnavailable as error:
-            return refused(str(error), 503)
+            return unavailable(error)
         if entered is None:
             return refused("The teacher has removed you from this room, or it has ended.", 403)
         ticket, room = entered
@@ -253,10 +252,8 @@ class _Pages:
             known = {each.name: each for each in await self._threads.run(lambda: self._contents)}
         except (BadSignature, ValueError, TypeError):
             return refused("The choice is not valid any more. Start it again on the platform.", 403)
-        except _TooManyLaunchesError:
-            return busy()
         except ClassroomUnavailable as error:
-            return refused(str(error), 503)
+            return unavailable(error)
         platform = self._platforms.find(issuer, client_id)
         if platform is None:
             return refused("The platform is no longer registered here.", 403)
@@ -291,6 +288,6 @@ def refused(words: str, status: int, wait: float = 0.0) -> Response:
     return HTMLResponse(page, status, headers=headers)
 
 
-def busy() -> Response:
-    """More launches come in than the database takes."""
-    return refused("Too many users of learning platforms arrive at the moment.", 503, PATIENCE)
+def unavailable(error: ClassroomUnavailable) -> Response:
+    """The page while the database is away, or has too much to do."""
+    return refused(str(error), 503, PATIENCE if isinstance(error, _TooManyLaunchesError) else 0.0)
