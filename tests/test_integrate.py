@@ -32,7 +32,8 @@ import runpy, sys
 class Missing:
     def find_spec(self, name, path=None, target=None):
         package = name.partition(".")[0]
-        if package[0] != "_" and package not in {*sys.stdlib_module_names, "kin", "numpy", "numba", "llvmlite"}:
+        ours = {"kin", "numpy", "numba", "llvmlite", "tomli_w"}
+        if package[0] != "_" and package not in ours | sys.stdlib_module_names:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Missing())

@@ -302,7 +302,7 @@ def test_wrong_answers_of_kinboard_are_reported_as_faults(monkeypatch):
 
 @pytest.mark.full
 def test_an_interrupted_run_reports_its_results_so_far():
-    def stop(words, share):
+    def stop(words):
         if words.startswith("round 2"):
             raise KeyboardInterrupt
 

@@ -107,9 +107,11 @@ def parts_of(one: Exercise, variant: Variant) -> list[list[tuple[float, float]]]
     kind, scales, near = one.kind, ANGLES, 1e-3
     if isinstance(kind, NumberKind):
         unit = kind._shown_unit(UNITS)
-        near = kind.tolerance * unit.scale
+        nears = [question.tolerance * unit.scale for question in kind._questions(variant, UNITS)]
         scales = ANGLES if unit == UNITS.angles else LENGTHS if unit == UNITS.lengths else (1.0,)
-        return [[(value * scale, near * scale) for scale in scales] for value in flat]
+        return [
+            [(value * scale, near * scale) for scale in scales] for value, near in zip(flat, nears, strict=True)
+        ]
     if form == "table":
         return [[(x * scale, near * abs(x * scale)) for scale in (*ANGLES, *LENGTHS[1:])] for x in flat]
     return [[(x * scale, near * abs(x * scale)) for scale in scales] for x in flat]
