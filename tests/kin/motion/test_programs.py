@@ -181,7 +181,7 @@ def test_a_path_instead_of_the_text_of_a_program_is_named(text):
 
 
 def test_what_is_no_program_is_not_written():
-    with pytest.raises(kin.InputError, match=r"program: .* a kin\.Program"):
+    with pytest.raises(kin.InputError, match=r"program: .* a kin\.motion\.Program"):
         kin.motion.program_to_dict([kin.motion.Dwell(1.0)])
 
 
