@@ -323,6 +323,20 @@ def test_modules_of_tests_have_names_of_their_own():
 # Numbers that only fall: a change that makes one smaller writes the new one here.
 PRIVATE = 223  # uses of others' private names in tests
 IMPORTANT = 93  # in style sheets: most override what viser or Mantine writes into the style of an element
+# Private fields that features change, by class; none of all others.
+FIELDS = {
+    "Capability": 3,
+    "CourseFeature": 2,
+    "Guide": 7,
+    "Member": 6,
+    "ObstaclesFeature": 5,
+    "Practising": 11,
+    "ProgramTab": 13,
+    "RobotTab": 6,
+    "Screen": 9,
+    "Workspace": 13,
+}
+FEATURE = re.compile(r"(Feature|Lesson|Screen)\b")
 NOT_PRIVATE = {"_replace", "_asdict", "_fields", "_make", "_repr_html_"}  # of named tuples and IPython
 
 
@@ -345,6 +359,46 @@ def test_tests_use_fewer_and_fewer_private_names():
 def test_private_names_are_found():
     source = "import a\nfrom b import _x, y\na._z = self._own\na.b._c(t._replace(d=1))\na.__doc__"
     assert sorted(private_names({"t.py": source})) == ["t.py: _c", "t.py: _x", "t.py: _z"]
+
+
+def fields_of_features(sources: Sources) -> Iterator[str]:
+    """Private fields that methods of a feature change: what is to be seen follows from its settings and facts.
+
+    What is made when it is built, or when there is another robot, does not count.
+    """
+    for path, source in sources.items():
+        classes = (node for node in ast.walk(tree(source)) if isinstance(node, ast.ClassDef))
+        for one in (each for each in classes if any(FEATURE.search(ast.unparse(base)) for base in each.bases)):
+            methods = (node for node in one.body if isinstance(node, FunctionDef))
+            changing = (each for each in methods if each.name not in ("__init__", "started"))
+            stored = (node for method in changing for node in ast.walk(method) if isinstance(node, ast.Attribute))
+            names = {
+                node.attr
+                for node in stored
+                if isinstance(node.ctx, ast.Store) and ast.unparse(node.value) == "self"
+                if node.attr.startswith("_")
+            }
+            yield from (f"{path}::{one.name}.{name}" for name in sorted(names))
+
+
+def test_features_change_no_private_fields():
+    sources = {k: v for k, v in read_sources("app/viewer").items() if not k.startswith("app/viewer/declared/")}
+    found = Counter(place.rpartition(".")[0].rpartition("::")[2] for place in fields_of_features(sources))
+    assert found == FIELDS
+
+
+def test_private_fields_of_features_are_found():
+    source = (
+        "class A(DeclaredFeature[B, C], Lesson):\n"
+        "    def started(self): self._made = 1\n"
+        "    def on_go(self):\n"
+        "        self._a, self.b = 1, 2\n"
+        "        self._c: int = 3\n"
+        "        self._d.e += self._f\n"
+        "class D(E):\n"
+        "    def on_go(self): self._g = 1\n"
+    )
+    assert [*fields_of_features({"a.py": source})] == ["a.py::A._a", "a.py::A._c"]
 
 
 def test_style_sheets_have_fewer_and_fewer_important_declarations():

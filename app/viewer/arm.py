@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 from kin import IKOptions, JointConstraints, Obstacle, Robot, fk
@@ -76,10 +77,19 @@ class Arm:
             locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
         return _options(self.task, locked, self.branch, self.avoid, self.obstacles if self.avoid else ())
 
-    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
+    @property
+    def contacts_at(self) -> Callable[[Array], tuple[Contact, ...]]:
         """What the arm touches at a configuration ``(n,)``, the deepest first.
 
         Links that are only assumed are compared with each other on request: they may be far from those drawn.
         """
         links = self.avoid or bool(self.robot.capsules)
-        return surroundings(self.robot, self.obstacles, links).touches(q) if links or self.obstacles else ()
+        return surroundings(self.robot, self.obstacles, links).touches if links or self.obstacles else _nothing
+
+    def at(self, q: Array) -> Arm:
+        """The same arm at another configuration ``(n,)``."""
+        return replace(self, q=q)
+
+
+def _nothing(q: Array) -> tuple[Contact, ...]:
+    return ()

@@ -17,19 +17,21 @@ viser::
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, ParamSpec, TypeVar, cast
 
-from app.viewer.declared.facts import Facts
+from app.viewer.arm import Arm
+from app.viewer.declared.facts import ArmReads, Facts
 from app.viewer.declared.fields import Settings
 from app.viewer.declared.panel import Event, Html, PanelView
 from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Lazy, SceneView
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Runner, Sweep, Work
 from app.viewer.feature import Feature, Stage
 from app.viewer.views.templates import render
-from kin import InputError
+from kin import IKResult, InputError
 from kin.transforms import Array
 
 S = TypeVar("S", bound=Settings)
@@ -47,8 +49,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
         undo: what undo calls an event, by the method that it calls, if not by the feature's title.
         pace: the panel follows a moving arm at this interval (s), or more seldom where many visitors' arms move:
             nobody reads faster, and HTML is long.
-        facts: what is known of settings and arm now, made by `compute_facts`; the same object as long as both are.
-            While an event is handled, they are those before it.
+        facts: what is known of settings and arm now; the same object as long as the settings, the results of work,
+            and all that was read of the arm are. While an event is handled, they are
+            those before it.
         read: the facts that the panel shows. Drawings that change no faster than the panel use these.
         shown_at: when the panel was last made to show them (`time.perf_counter`).
     """
@@ -68,46 +71,52 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
         self._panel = PanelView(stage.client.gui, self.post, stage.fence)
         self._scene = SceneView(stage.client.scene, self.key, self.post)
+        self._runner = Runner(lambda: self.post(("done", ())))
         self.shown_at = 0.0
         self._write = self._stale = False
-        self._seen: tuple[object, ...] = ()
         self._withheld = stage.activity.withheld
-        self.facts: F
-        self.read: F
+        self._reads = ArmReads(stage.now)
+        self.facts: F = self._facts()
+        self.read = self._drawn = self.facts
+        self.built()
         self.started()
         self._begin()
 
     # To be overridden
 
+    def built(self) -> None:
+        """The feature is in the page: parts that viser shows elsewhere can be made."""
+
     def started(self) -> None:
         """There is a robot: the first, or another one."""
 
-    def compute_facts(self) -> F:
-        """The facts of the present settings and arm."""
-        return cast(F, self.facts_of(self.settings, self.stage.now))
-
-    def extra_dependencies(self) -> tuple[object, ...]:
-        """What `compute_facts` depends on beside settings and arm, such as the last answer of long work."""
-        return ()
+    def sources(self) -> Mapping[str, Any]:
+        """What the facts get besides, by the names of their fields; always the same objects."""
+        return {}
 
     def panel(self) -> Sequence[PanelNode]:
-        """What the panel shows."""
+        """What the panel shows; of the arm only what `read` gives, so that it is known what it depends on."""
         return ()
 
     def scene(self) -> Sequence[SceneNode | Lazy]:
-        """What the scene shows; asked for with each frame of a moving arm."""
+        """What the scene shows; asked for with each frame in which something has changed that was read."""
         return ()
 
     def legend(self) -> str | None:
         """What is drawn, in words; None: the feature has no legend."""
         return None
 
+    def running(self) -> Sequence[Work | Sweep]:
+        """What goes on by itself, for the present facts."""
+        return ()
+
     def changed(self, path: str) -> None:
         """The visitor has set the field at this path."""
 
-    def advance(self, now: float) -> float | None:
-        """Continue a motion or long work; returns in how many seconds to go on, None: there is none."""
-        return None
+    def worked(self, key: str) -> None:
+        """There is something new of the work with this key, in `facts`."""
+        if (error := self.facts.work(key).error) is not None:
+            raise error
 
     # For subclasses
 
@@ -115,13 +124,17 @@ class DeclaredFeature(Feature, Generic[S, F]):
         """Set fields."""
         self.settings = replace(self.settings, **values)
 
+    def rewrite(self) -> None:
+        """Let all controls show their settings, those too whose value was refused."""
+        self._write = True
+
     @staticmethod
     def event(method: Callable[P, None], *args: P.args, **_: P.kwargs) -> Event:
         """The event that calls one of the feature's methods; the arguments are hashable."""
         return method.__name__, *args
 
     def schedule(self, seconds: float = 0.0) -> None:
-        """Ask for `advance`, and show what is declared, in so many seconds or earlier."""
+        """Show what is declared in so many seconds or earlier."""
         self._stale = self._stale or seconds == 0.0
         self.due = seconds if self.due is None else min(self.due, seconds)
 
@@ -144,7 +157,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
             self._withheld = self.stage.activity.withheld
             self._scene.remove()  # hidden nodes too: the browser has their data
         self.invalidate()
-        self.read = self.facts
+        self.read = self._drawn = self.facts
         stage = self.stage
         self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write)
         self._write = False
@@ -152,39 +165,58 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if (words := self.legend()) is not None:
             stage.show_legend(words)
 
-    def draw(self) -> None:
-        """Show the scene that is declared now: a frame of a motion, between two times of the panel."""
-        self.invalidate()
-        self._scene.show(self.scene())
-
     def invalidate(self) -> None:
-        """Make `facts` anew if settings, arm, or `extra_dependencies` have changed."""
-        arm = self.stage.now
-        target = None if arm.target is None else arm.target.tobytes()
-        places = (arm.q.tobytes(), arm.goal.tobytes(), target)
-        seen: tuple[object, ...] = (
-            self.settings,
-            *places,
-            arm.robot,
-            arm.task,
-            arm.branch,
-            arm.locks,
-            arm.obstacles,
-            arm.avoid,
+        """Make `facts` anew if something that they were made of has changed."""
+        facts, stage = self.facts, self.stage
+        same = (
+            facts.settings is self.settings and facts.works is self._runner.results and facts.units == stage.units
         )
-        seen += self.extra_dependencies()
-        if seen != self._seen:
-            self._seen, self.facts = seen, self.compute_facts()
+        if not (same and self._reads.follow(stage.now)):
+            self._reads = ArmReads(stage.now)
+            self.facts = self._facts()
+
+    def _facts(self) -> F:
+        results, units = self._runner.results, self.stage.units
+        return cast(F, self.facts_of(self.settings, cast(Arm, self._reads), results, units, **self.sources()))
+
+    def _follow(self) -> None:
+        """Show what has changed with the arm: the scene at once, the panel at its pace."""
+        if self._outdated:
+            return
+        self.invalidate()
+        self._draw()
+        if self.facts is not self.read:
+            self.schedule(max(0.0, self._interval - (time.perf_counter() - self.shown_at)))
+
+    def _draw(self) -> None:
+        """Show the scene that is declared now: a frame of a motion, between two times of the panel."""
+        if self.facts is not self._drawn:
+            self._drawn = self.facts
+            self._scene.show(self.scene())
+
+    @property
+    def _outdated(self) -> bool:
+        """Whether there is another robot for which `on_robot` has not been called yet."""
+        return self.facts.robot != self.stage.now.robot
 
     @property
     def _interval(self) -> float:
         return max(self.pace, self.stage.reading)
 
     def _begin(self) -> None:
-        """Show what is declared, and ask for `advance` if there is anything to continue."""
+        """Show what is declared, and begin what goes on."""
         self.refresh()
-        if type(self).advance is not DeclaredFeature.advance:
-            self.due = 0.0
+        self.due = 0.0
+
+    def _go_on(self, now: float) -> float | None:
+        """Carry on work and motions; returns in how many seconds to go on."""
+        self.invalidate()
+        again, news = self._runner.go_on(self.running(), now)
+        self._stale = self._stale or bool(news)
+        self.invalidate()
+        for key in news:
+            self.worked(key)
+        return again
 
     # Feature
 
@@ -199,8 +231,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
             case ("do", (str(name), *arguments), int(serial), int()):
                 if self._panel.is_live(serial):
                     getattr(self, name)(*arguments)
-            case ("done", (str(name), *arguments)):
-                getattr(self, name)(*arguments)
+            case ("done", ()):
+                self._go_on(time.perf_counter())
             case ("drag", (str(name), *arguments)):
                 assert isinstance(value, tuple)
                 getattr(self, name)(*arguments, *value[:1], value[1:])
@@ -217,41 +249,59 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def on_robot(self) -> None:
         self._scene.remove()
+        self._runner.end()
         self.settings = self.settings.for_robot(self.stage.now.robot)
+        self.invalidate()
         self.started()
         self._begin()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self.draw()
-        self.schedule(max(0.0, self._interval - (time.perf_counter() - self.shown_at)))
+        self._follow()
+
+    def on_result(self, result: IKResult) -> None:
+        self._follow()
+
+    def on_request(self) -> None:
+        self._follow()
+
+    def on_obstacles(self) -> None:
+        self._follow()
 
     def on_style(self) -> None:
         self._begin()
 
     def on_activity(self) -> None:
-        if self._withheld != self.stage.activity.withheld:
-            self._begin()  # a refresh alone would end what `advance` has begun
+        if self._withheld != self.stage.activity.withheld and not self._outdated:
+            self._begin()
 
     def tick(self, now: float) -> None:
-        again = self.advance(now)
-        wait = self._interval - (now - self.shown_at)
-        if wait <= 0.0 or self._stale:
+        self.due, again = None, None
+        self.invalidate()
+        if self._stale or (self.facts is not self.read and now - self.shown_at >= self._interval):
             self.refresh()
-            wait = self._interval
-        elif again is None:
-            self.due = wait
-        if again is not None:
-            self.due = min(wait, again)
+        try:
+            again = self._go_on(now)
+        finally:
+            self.invalidate()
+            self._draw()
+            changed = self.facts is not self.read
+            wait = max(0.0, self._interval - (now - self.shown_at)) if changed else None
+            waits = again, 0.0 if self._stale else wait
+            self.due = min((one for one in waits if one is not None), default=None)
 
     def state(self) -> dict[str, object]:
         return self.settings.state()
 
     def restore(self, state: dict[str, object]) -> None:
         self.settings = self.settings.restored(state, self.stage.now.robot)
-        self._write = True
+        self.rewrite()
         self._begin()
 
+    def on_leave(self) -> None:
+        self._runner.end()
+
     def remove(self) -> None:
+        self._runner.end()
         if self.legend() is not None:
             self.stage.show_legend("")
         self._scene.remove()

@@ -407,6 +407,11 @@ def kept(default: Any, **options: Any) -> Any:
     return _field(Kept(default=default, **options))
 
 
+def memory(default: Any = None, renew: bool = True) -> Any:
+    """A field without a control that lives as long as the page, or the robot: neither links nor undo have it."""
+    return kept(default, link=False, renew=renew)
+
+
 def part(of: type[Settings]) -> Any:
     """A field with settings of a part."""
     return field(default_factory=of, metadata={"spec": Part(of=of)})

@@ -9,7 +9,7 @@ in that unit.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, TypeVar
@@ -371,7 +371,7 @@ class PanelView:
         handle.on_click(clicked)
 
 
-def same(a: Sequence[Any], b: Sequence[Any]) -> bool:
+def same(a: Collection[Any], b: Collection[Any]) -> bool:
     """Whether arguments are the same: arrays by their values, everything else as it compares."""
     return len(a) == len(b) and all(x is y or _equal(x, y) for x, y in zip(a, b, strict=True))
 

@@ -7,9 +7,10 @@ file and ``kinboard check`` have one reader and the same messages.
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import kin
 from app.exercises import Exercise, ExerciseFileError, Exercises, Trial, Variant, builtin_exercises, tried
@@ -20,7 +21,7 @@ from app.exercises.shelf import digest, written_in_a_page
 from app.viewer.activity.activity import AUTHOR, EXERCISES
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
-from app.viewer.declared.fields import Settings
+from app.viewer.declared.fields import Settings, memory
 from app.viewer.declared.fields import text as text_field
 from app.viewer.declared.panel import Html
 from app.viewer.declared.panel import Node as PanelNode
@@ -31,7 +32,6 @@ from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 from kin.parsing import to_toml
-from kin.transforms import Array
 
 FILE = "exercise"
 _TAKEN = re.compile(r"-(\d+)$")
@@ -39,23 +39,40 @@ _TAKEN = re.compile(r"-(\d+)$")
 
 @dataclass(frozen=True)
 class AuthorSettings(Settings):
-    """The draft as the text of a file; empty: none is open."""
-
-    draft: str = text_field("Exercise", longest=MOST_BYTES, undo="Exercise text")
-
-
-@dataclass(frozen=True, eq=False)
-class Drafted(Facts[AuthorSettings]):
-    """What is known of the draft; `find` gives the arm of an id.
+    """The draft as the text of a file; empty: none is open.
 
     Attributes:
-        known: the exercise of the service with the draft's id.
-        is_mine: whether the draft is another version of that one.
+        served: what the folder of the service has of this page, by id: `digest`. Undo does not change it.
+        error: why the last act was refused.
     """
 
-    known: Exercise | None
-    is_mine: bool
+    draft: str = text_field("Exercise", longest=MOST_BYTES, undo="Exercise text")
+    served: tuple[tuple[str, str], ...] = memory((), renew=False)
+    error: views.Refusal = memory(views.Refusal(), renew=False)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Drafted(Facts[AuthorSettings]):
+    """What is known of the draft.
+
+    Attributes:
+        exercises: those of the service.
+        find: gives the arm of an id.
+    """
+
+    exercises: Exercises
     find: Find
+
+    @cached_property
+    def known(self) -> Exercise | None:
+        """The exercise of the service with the draft's id."""
+        return self.exercises.get(_id_of(self.settings.draft))
+
+    @property
+    def is_mine(self) -> bool:
+        """Whether the draft is another version of that one."""
+        known = self.known
+        return known is not None and dict(self.settings.served).get(known.id) == digest(known.source)
 
     @cached_property
     def data(self) -> forms.Draft:
@@ -84,7 +101,7 @@ class Drafted(Facts[AuthorSettings]):
         return self.trial.variants[0] if self.trial.variants else None
 
 
-@lru_cache(maxsize=16)  # facts are made anew with each frame of a moving arm
+@lru_cache(maxsize=16)  # facts are made anew with each event
 def _trial(draft: str, find: Find) -> Trial:
     return tried(draft, FILE, find)
 
@@ -102,9 +119,6 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     def __init__(self, stage: Stage) -> None:
         self.shown = False
-        self._error = views.Refusal()
-        # What the folder of the service has of this page, by id: `digest`. Undo does not change it.
-        self._served: dict[str, str] = {}
         super().__init__(stage)
 
     def show(self) -> None:
@@ -119,23 +133,13 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     # Declared
 
-    def compute_facts(self) -> Drafted:
-        known = self._exercises.get(self._id)
-        mine = known is not None and self._served.get(known.id) == digest(known.source)
-        return Drafted(self.settings, self.stage.now, known, mine, self.stage.store.get)
-
-    def extra_dependencies(self) -> tuple[object, ...]:
-        return (self._exercises.get(self._id), *self._served.items())
+    def sources(self) -> Mapping[str, Any]:
+        return {"exercises": self._exercises, "find": self.stage.store.get}
 
     @property
     def _exercises(self) -> Exercises:
         """Those of the service."""
         return self.stage.activity.courses.exercises
-
-    @property
-    def _id(self) -> object:
-        """The id in the draft, whatever it is."""
-        return _id_of(self.settings.draft)
 
     def panel(self) -> Sequence[PanelNode]:
         if not self.shown:
@@ -144,9 +148,9 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         if activity.practice.seated:
             return [Html(views.student_html, ())]
         if not f.data:
-            return [Html(views.start_html, (activity.exercises.all, self._error))]
+            return [Html(views.start_html, (activity.exercises.all, self.settings.error))]
         trial, robots = f.trial, tuple(robot.id for robot in self.stage.store.robots)
-        values, refusal = trial.values(units), self._error or views.Refusal(trial.field, trial.error)
+        values, refusal = trial.values(units), self.settings.error or views.Refusal(trial.field, trial.error)
         nodes: list[PanelNode] = [Html(views.head_html, (trial, refusal, self._place))]
         for i, group in enumerate(forms.groups(f.data, robots)):
             nodes.append(Html(views.group_html, (group, i, values, refusal)))
@@ -179,13 +183,14 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             case (str(name), *rest) if name in self.messages:
                 if self.stage.activity.practice.seated:
                     raise InputError("exercise", name, "a page of a teacher: this one is a student’s in a room")
+                self.change(error=views.Refusal())  # with new facts: another page may have saved the exercise
                 self.invalidate()
                 self.schedule()
-                self._error = views.Refusal()
                 try:
                     self._act(name, rest, value)
                 except (ExerciseFileError, InputError) as error:
-                    self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
+                    why = f"got {error.value}, expected {error.expected}"
+                    self.change(error=views.Refusal(error.field, why))
                 self.invalidate()
             case _:
                 super().handle(key, value)
@@ -236,7 +241,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             raise InputError("exercise", origin, "the id of an exercise, or one of the kinds " + ", ".join(KINDS))
         data = forms.read(one.source)
         if self.stage.may_save and not one.builtin and not known.is_own(one.id) and written_in_a_page(one):
-            self._served[one.id] = digest(one.source)  # it is changed where it is; with another id, a new one
+            self._serves(one)  # it is changed where it is; with another id, a new one
         elif not known.is_own(one.id):
             data["id"] = _free(one.id, known)
             data["title"] = f"{one.title} (mine)"[:80]
@@ -314,11 +319,16 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         """Into the folder of the service, for all pages."""
         self.invalidate()
         again = self.facts.known is not None
-        saved = self._exercises.save(to_toml(self.facts.data), self._served.get(exercise.id, ""))
-        self._served[exercise.id] = digest(saved.source)
+        saved = self._exercises.save(to_toml(self.facts.data), dict(self.settings.served).get(exercise.id, ""))
+        self._serves(saved)
         self._offer()
         title = f"{saved.title} is {'replaced' if again else 'saved'} on the server"
         self.stage.notify(Notice("hand", title, "Other pages have it when they next open the list of exercises."))
+
+    def _serves(self, exercise: Exercise) -> None:
+        """The folder of the service has this one of the page."""
+        served = dict(self.settings.served) | {exercise.id: digest(exercise.source)}
+        self.change(served=tuple(served.items()))
 
     def _offer(self) -> None:
         """The page's exercises have the draft, as long as it is one."""
@@ -331,9 +341,6 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         names = {"try": "Try the exercise", "close": "Exercise closed", "pose": "Posture of the exercise"}
         return names.get(str(key[0]), "Exercise text") if isinstance(key, tuple) else self.title
 
-    def on_pose(self, T_base_tool: Array) -> None:
-        """The form does not follow the arm."""
-
     def on_robot(self) -> None:
         if self.shown:
             super().on_robot()
@@ -341,7 +348,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
     def state(self) -> dict[str, object]:
         if not self.settings.draft:
             return {}
-        served = self._served.get(str(self._id), "")
+        served = dict(self.settings.served).get(str(_id_of(self.settings.draft)), "")
         return {**super().state(), **({"served": served} if served else {})}
 
     def restore(self, state: dict[str, object]) -> None:
@@ -349,7 +356,8 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             return  # the draft of a teacher who leads the class has the answer
         served, draft = state.get("served"), state.get("draft")
         if isinstance(served, str) and isinstance(draft, str):
-            self._served.setdefault(str(_id_of(draft)), served)
+            known = {str(_id_of(draft)): served, **dict(self.settings.served)}
+            self.change(served=tuple(known.items()))
         super().restore({"draft": "", **state})
         self.invalidate()
         self._offer()

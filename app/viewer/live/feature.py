@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
@@ -14,11 +15,12 @@ from app.live.recording import Bounds, Recording
 from app.live.recording.recording import READ
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
-from app.viewer.declared.fields import Settings, slider
+from app.viewer.declared.fields import Settings, memory, slider
 from app.viewer.declared.panel import Button, Buttons, Control, Html, Progress
 from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Sweep, Work
 from app.viewer.feature import Stage
 from app.viewer.live import views
 from app.viewer.live.drawings import Drawings, merged, nodes
@@ -45,17 +47,23 @@ AT_HINT = "Shows the arm as it was commanded then, and the measured arm beside i
 
 @dataclass(frozen=True)
 class TapeSettings(Settings):
-    """Where the recording is shown. A link keeps nothing of a connection."""
+    """Where the recording is shown, and what a program sends. A link keeps nothing of a connection.
+
+    Attributes:
+        drawings: what the program draws.
+        measured: where it has measured the arm ``(n,)``.
+        driven: what it drives.
+        program: its name; "": none is connected.
+    """
 
     at: float = slider("Time (s)", 0.0, (0.0, LONGEST), hint=AT_HINT, digits=2, step=0.01, link=False)
+    drawings: Drawings | None = memory(renew=False)
+    measured: Array | None = memory()
+    driven: str = memory("", renew=False)
+    program: str = memory("", renew=False)
 
 
-@dataclass(frozen=True, eq=False)
-class ConnectFacts(Facts[TapeSettings]):
-    """The arm on show."""
-
-
-class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
+class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     """See the module.
 
     Attributes:
@@ -64,20 +72,16 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
 
     key = "connect"
     title = "Connected program"
-    settings_of, facts_of = TapeSettings, ConnectFacts
+    settings_of, facts_of = TapeSettings, Facts
     messages = frozenset({"upload"})
     files = MappingProxyType({"upload": OPENED.size})
     undo: ClassVar[dict[str, str]] = {"on_show_arm": "Another arm"}
 
     def __init__(self, stage: Stage) -> None:
         self.contacts: Sequence[Contact] = ()
-        self._drawings: Drawings = {}
         self._numbers = count(1)
-        self._measured: Array | None = None
-        self._driven = ""  # what the program drives
         self._tape = Tape(stage)
         self._opening = Opening(stage, self.post, OPENED)
-        self._was = ""  # the program of the last look
         super().__init__(stage)
 
     # What the program sends
@@ -86,19 +90,19 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         """Take what the program draws and measures; raises `kin.InputError`."""
         self.schedule()
         if "drives" in values:
-            self._driven = values["drives"] or ""
-            self.stage.show_driven(self._driven)
-            if self._driven:
+            self.change(driven=values["drives"] or "")
+            self.stage.show_driven(self.settings.driven)
+            if self.settings.driven:
                 self._tape.stop()
         if "measured" in values:
             measured = values["measured"]
             if measured is not None:
                 measured = self.stage.now.robot.check_q(measured, "measured")
-            self._measured = measured
+            self.change(measured=measured)
         if values.get("clear"):
-            self._drawings = {}
+            self.change(drawings=None)
         if drawn := values.get("draw"):
-            self._drawings = merged(self._drawings, drawn, self._numbers)
+            self.change(drawings=merged(self.settings.drawings or {}, drawn, self._numbers))
 
     # A recording that is opened
 
@@ -138,10 +142,9 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         if recording is None:
             return
         self._tape.open(recording)
-        self._measured = None
-        self.change(at=0.0)
-        self._write = True
-        if recording.robot != self.stage.now.robot and not self._driven:
+        self.change(at=0.0, measured=None)
+        self.rewrite()
+        if recording.robot != self.stage.now.robot and not self.settings.driven:
             self.on_show_arm()
         words = f"{recording.seconds:.1f} s of the {recording.robot.name}. Play it in the tab Program."
         self.stage.notify(Notice("hand", f"{self._opening.name} is open", words))
@@ -150,9 +153,9 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         """Show the arm of the recording; raises `InputError`."""
         recording = self._tape.recording
         assert recording is not None
-        if self._driven:
+        if self.settings.driven:
             words = (
-                f"{self._driven} is driven",
+                f"{self.settings.driven} is driven",
                 "Another arm on show would be driven as well. End its program first.",
             )
             self.stage.notify(Notice("error", *words))
@@ -172,46 +175,47 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
     def on_robot(self) -> None:
         self._tape.end("another arm was shown")
         self._tape.stop()
-        self._measured = None
         super().on_robot()
 
     def on_contacts(self, contacts: Sequence[Contact]) -> None:
         self.contacts = contacts
 
-    def on_pose(self, T_base_tool: Array) -> None:
-        if self._measured is not None:  # nothing else here depends on the pose
-            super().on_pose(T_base_tool)
-
     def on_leave(self) -> None:
+        super().on_leave()
         self._opening.stop()
         self._tape.discard()
         self.stage.door.close("The page was closed.")
 
     # Declared
 
-    def extra_dependencies(self) -> tuple[object, ...]:
-        measured = None if self._measured is None else self._measured.tobytes()
-        return measured, self._opening.busy, tuple(number for number, _ in self._drawings.values())
-
-    def advance(self, now: float) -> float | None:
+    def running(self) -> Sequence[Work | Sweep]:
         line = self.stage.door.line
         name = "" if line is None or line.program is None else line.program.name
-        if name != self._was:
-            if name:
-                self.stage.notify(Notice("hand", f"{name} is connected", "It may move the arm. Tab Program."))
-            elif line is not None:
-                self.stage.notify(Notice("hand", f"{self._was} has left", "The code still counts."))
-            self._was = name
-            self._stale = True
+        found: list[Work | Sweep] = [Work("program", self._meet, (name,))]
         if self._tape.playing:
-            self._measured = self._tape.advance(now)
-            self.change(at=self._tape.time)
-            self._write = True
-            return self.stage.frame
-        live = bool(self._was) or self._tape.running or self._opening.busy is not None
-        if live and now - self.shown_at >= LOOK_AGAIN:
-            self._stale = True
-        return LOOK_AGAIN if live else None
+            found.append(Sweep(self._play, self.stage.frame, math.inf))
+        elif name or self._tape.running or self._opening.busy is not None:
+            found.append(Sweep(self._look, LOOK_AGAIN))
+        return found
+
+    def _meet(self, name: str) -> None:
+        """Say who has connected or left."""
+        before = self.settings.program
+        self.change(program=name)
+        if name and name != before:
+            self.stage.notify(Notice("hand", f"{name} is connected", "It may move the arm. Tab Program."))
+        elif before and not name and self.stage.door.line is not None:
+            self.stage.notify(Notice("hand", f"{before} has left", "The code still counts."))
+
+    def _look(self, seconds: float) -> None:
+        """Look at the rate of the program and its delay, and how far a recording or a file is."""
+        self.schedule()
+
+    def _play(self, seconds: float) -> None:
+        """Show the next frame of the recording."""
+        measured = self._tape.advance(seconds)
+        self.change(at=self._tape.time, measured=measured)
+        self.rewrite()
 
     def panel(self) -> Sequence[PanelNode]:
         door, line = self.stage.door, self.stage.door.line
@@ -228,11 +232,11 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
 
     def _compared(self) -> list[PanelNode]:
         """Where the arm was measured, and by how much that is beyond where it is commanded."""
-        if self._measured is None:
+        f, measured = self.read, self.settings.measured
+        if measured is None:
             return []
-        arm = self.stage.now
-        gap = np.round(self._measured - arm.q, 6)
-        args = arm.robot, gap.tobytes(), self._measured.tobytes(), self.stage.units
+        gap = np.round(measured - f.q, 6)
+        args = f.robot, gap.tobytes(), measured.tobytes(), self.stage.units
         return [Html(views.measured, args, key="measured")]
 
     def _recorded(self) -> list[PanelNode]:
@@ -270,10 +274,10 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         return [*found, Buttons("Save as", saves, key="save"), discard, *new]
 
     def scene(self) -> Sequence[SceneNode | Lazy]:
-        drawn = tuple(self._drawings.values())
+        drawn, measured = tuple((self.settings.drawings or {}).values()), self.settings.measured
         found: list[SceneNode | Lazy] = [Lazy("drawings", nodes, (drawn,))] if drawn else []
-        if self._measured is not None:
-            found.append(ghost("measured", self.stage.now.robot, self._measured, GHOST, OPACITY))
+        if measured is not None:
+            found.append(ghost("measured", self.stage.now.robot, measured, GHOST, OPACITY))
         return found
 
     def on_open(self) -> None:
@@ -301,14 +305,15 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
     def changed(self, path: str) -> None:
         self._tape.stop()
         if self._may_play():
-            self._measured = self._tape.show(self.settings.at)
+            self.change(measured=self._tape.show(self.settings.at))
 
     def _may_play(self) -> bool:
         """Whether the arm may be moved as recorded."""
-        if self._driven:
-            words = f"{self._driven} is driven", "It would move as recorded. Let its program play the recording."
-            self.stage.notify(Notice("error", *words))
-        return self._tape.playable and not self._driven
+        if self.settings.driven:
+            title = f"{self.settings.driven} is driven"
+            detail = "It would move as recorded. Let its program play the recording."
+            self.stage.notify(Notice("error", title, detail))
+        return self._tape.playable and not self.settings.driven
 
     def on_save(self, kind: str) -> None:
         """Download the recording."""
@@ -318,12 +323,12 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
     def on_discard(self) -> None:
         """Forget the recording, and the measured arm that it shows."""
         self._tape.discard()
-        self._measured = None
+        self.change(measured=None)
 
     def on_close(self) -> None:
         """Withdraw the code, and remove what the program has drawn."""
         self.stage.door.close()
         self._tape.end(STOPPED)
-        self._drawings, self._measured, self._was, self._driven = {}, None, "", ""
+        self.change(drawings=None, measured=None, program="", driven="")
         self.stage.show_driven("")
         self.stage.notify(Notice("hand", "The code is withdrawn", "No program can move this page with it."))

@@ -32,7 +32,6 @@ class Tape:
         self.playing = False
         self._line: Line | None = None  # that is or was recorded
         self._track: Track | None = None
-        self._stepped = 0.0
 
     @property
     def running(self) -> bool:
@@ -97,7 +96,7 @@ class Tape:
         """Go on from the present time, or begin again at the end."""
         if self.time >= self.seconds:
             self.time = 0.0
-        self.playing, self._stepped = True, 0.0
+        self.playing = True
         self._stage.play(True)
 
     def stop(self) -> None:
@@ -106,11 +105,9 @@ class Tape:
             self.playing = False
             self._stage.play(False)
 
-    def advance(self, now: float) -> Array | None:
-        """Show the time that it is now while it is played; returns the measured arm."""
-        if self._stepped:
-            self.time += now - self._stepped
-        self._stepped = now
+    def advance(self, seconds: float) -> Array | None:
+        """Go on for so many seconds while it is played; returns the measured arm."""
+        self.time += seconds
         if self.time >= self.seconds:
             self.stop()
         return self.show(min(self.time, self.seconds))

@@ -7,7 +7,6 @@ present configuration. In *Assign it yourself*, the student makes a table of the
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Hashable, Sequence
 
 from app.exports.worksheet import Left
@@ -15,6 +14,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Html, Node
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Sweep
 from app.viewer.feature import Stage
 from app.viewer.lessons.dh import assign_drawing, drawing, views
 from app.viewer.lessons.dh.assign import assign_html, measured_html, rows_html
@@ -22,7 +22,7 @@ from app.viewer.lessons.dh.attempt import Attempt
 from app.viewer.lessons.dh.axes_drawing import axis_names, joint_axes, room
 from app.viewer.lessons.dh.both import BothInView
 from app.viewer.lessons.dh.facts import DHFacts
-from app.viewer.lessons.dh.player import Player
+from app.viewer.lessons.dh.player import walked
 from app.viewer.lessons.dh.questions import outline
 from app.viewer.lessons.dh.settings import DHSettings
 from app.viewer.lessons.dh.steps import length
@@ -58,7 +58,6 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
 
     def started(self) -> None:
         robot = self.stage.now.robot
-        self._player: Player | None = None
         size = body(robot).size
         self._measured, self._axes = FigureNodes(size), FigureNodes(size)
         self.stage.see_through(True)
@@ -67,7 +66,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         self._aim()
 
     def restore(self, state: dict[str, object]) -> None:
-        self._player = None
+        self.change(plays=False)
         super().restore(state)
         if not self._compares:
             self._camera.restore()
@@ -93,7 +92,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         motions = {
             name: self.event(getattr(self, f"on_{name.lower()}")) for name in ("Back", "Play", "Pause", "Next")
         }
-        offered = ("Back", "Play" if self._player is None else "Pause", "Next")
+        offered = ("Back", "Pause" if s.plays else "Play", "Next")
         comparison = (robot, f.other, f.q, f.other_place, f.apart, units, asked) if s.compare else ()
         return [
             first,
@@ -126,7 +125,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
 
     def changed(self, path: str) -> None:
         if path in ("at", "assign"):
-            self._player = None
+            self.change(plays=False)
         if path in ("compare", "assign"):
             self._aim()
 
@@ -169,27 +168,22 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         """Go on by itself, from the base if it was at the end."""
         if self.settings.at >= length(self.stage.now.robot):
             self.change(at=0.0)
-        self._player = Player(time.perf_counter())
+        self.change(plays=True, rest=0.0)
 
     def on_pause(self) -> None:
         """Stay here."""
-        self._player = None
+        self.change(plays=False)
 
     def _go(self, at: int) -> None:
-        self._player = None
-        self.change(at=float(min(max(at, 0), length(self.stage.now.robot))))
+        self.change(plays=False, at=float(min(max(at, 0), length(self.stage.now.robot))))
 
-    def advance(self, now: float) -> float | None:
-        if self._player is None:
-            return None
+    def running(self) -> Sequence[Sweep]:
+        return [Sweep(self._walk, FRAME)] if self.settings.plays else []
+
+    def _walk(self, seconds: float) -> None:
         arm, s = self.stage.now, self.settings
-        self.change(at=self._player.advance(arm.robot, arm.q, s.at, s.speed, now))
-        if self.settings.at >= length(arm.robot):
-            self._player = None
-            self.schedule()
-            return None
-        self.draw()
-        return FRAME
+        at, rest = walked(arm.robot, arm.q, s.at, s.rest, s.speed, seconds)
+        self.change(at=at, rest=rest, plays=at < length(arm.robot))
 
     # The camera
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
-from app.viewer.declared.fields import Flag, Kept, Settings, choice, flag, slider
+from app.viewer.declared.fields import Flag, Kept, Settings, choice, flag, memory, slider
 from app.viewer.lessons.dh.attempt import Attempt
 from app.viewer.lessons.dh.player import SPEEDS
 from app.viewer.lessons.dh.steps import MOTIONS, length
@@ -40,7 +40,12 @@ class Own(Kept):
 
 @dataclass(frozen=True)
 class DHSettings(Settings):
-    """See the module; `at` is the place on the walk, in motions, of which its slider shows rows."""
+    """See the module; `at` is the place on the walk, in motions, of which its slider shows rows.
+
+    Attributes:
+        plays: whether the walk goes on by itself.
+        rest: how long it rests at its place (s).
+    """
 
     at: float = slider(
         "Row",
@@ -61,6 +66,8 @@ class DHSettings(Settings):
     assign: Attempt | None = field(
         default=None, metadata={"spec": Own(label="Assign it yourself", hint=ASSIGN_HINT)}
     )
+    plays: bool = memory(False)
+    rest: float = memory(0.0)
 
     def for_robot(self, robot: Robot) -> Self:
         """Another arm is walked from its base; who was assigning begins again on it."""

@@ -7,20 +7,37 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from app.equations import Book, Equation, Values
+from app.equations import Book, DerivationError, Equation, NotDerivedError, Values
 from app.viewer.declared.facts import Facts
 from app.viewer.lessons.equations.settings import EquationsSettings
-from app.viewer.lessons.equations.views import segments
+from app.viewer.lessons.equations.views import segments, summary
 from kin.transforms import Array
 
+DERIVING = "Deriving the equations of this arm …"
 SIZE = 0.2  # of an axis in the scene, relative to the reach of the arm
 
 
 @dataclass(frozen=True, eq=False)
 class EquationsFacts(Facts[EquationsSettings]):
-    """See the module; `book` has all equations, None: there are none, or none yet."""
+    """See the module."""
 
-    book: Book | None = None
+    @property
+    def book(self) -> Book | None:
+        """All equations; None: there are none, or none yet."""
+        found: Book | None = self.work("book").value
+        return found
+
+    @property
+    def about(self) -> str:
+        """Where the equations come from, or why there are none."""
+        match self.work("book").error:
+            case NotDerivedError() as error:
+                return f"No equations for so many rows: {error}."
+            case DerivationError() as error:
+                return f"No equations: {error}."
+            case None:
+                return DERIVING if self.book is None else summary(self.book)
+        return "The equations of this arm could not be derived."
 
     @cached_property
     def equation(self) -> Equation | None:

@@ -6,18 +6,17 @@ its point or axis next to the tool's own. For any other arm, the closed form is 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import numpy as np
 
-from app.equations import Book, DerivationError, NotDerivedError, book_later
+from app.equations import DerivationError, NotDerivedError, book_later
 from app.exports.worksheet import Formula, Left
-from app.shared.computations import Subscription
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy, label, lines
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Work
 from app.viewer.lessons.equations import views
 from app.viewer.lessons.equations.facts import EquationsFacts
 from app.viewer.lessons.equations.questions import outline
@@ -29,7 +28,6 @@ from kin import Robot
 AFTER_EDIT = 0.5  # s without another change of the visitor's own arm, before its equations are derived
 # Vermilion and bluish green, darkened because the scene applies gamma to lines.
 PRINTED, TRUE = (170, 29, 0), (0, 87, 43)
-DERIVING = "Deriving the equations of this arm …"
 WORST_HINT = "Moves the arm to the pose, within its limits, where this misprint has the largest effect"
 
 
@@ -42,49 +40,37 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
     about = "The arm’s equations. For the book’s arms, also its misprints."
     outline = staticmethod(outline)
     settings_of, facts_of = EquationsSettings, EquationsFacts
-    _derivation: Subscription[Book] | None = None
-    _derive_at: float | None = None  # of `time.perf_counter`
 
     @staticmethod
     def left(robot: Robot) -> Left:
         return "pose"
 
-    def started(self) -> None:
+    def running(self) -> Sequence[Work]:
         robot, own = self.stage.now.robot, self.stage.own
-        self._stop_deriving()
-        self._book: Book | None = None
-        self._words = DERIVING
-        if own is not None and own.robot == robot:  # which the visitor may still be editing
-            self._derive_at = time.perf_counter() + AFTER_EDIT
-        else:
-            self._derive()
+        edited = own is not None and own.robot == robot  # which the visitor may still be editing
+        return [Work("book", book_later, (robot,), rest=AFTER_EDIT if edited else 0.0)]
 
-    def extra_dependencies(self) -> tuple[object, ...]:
-        return (self._book,)
-
-    def compute_facts(self) -> EquationsFacts:
-        return EquationsFacts(self.settings, self.stage.now, self._book)
+    def worked(self, key: str) -> None:
+        error = self.facts.work(key).error
+        if not isinstance(error, DerivationError):
+            super().worked(key)
+        elif not isinstance(error, NotDerivedError):
+            self.stage.notify(Notice("error", "No equations for this arm", str(error)))
 
     def state(self) -> dict[str, object]:
-        equation = EquationsFacts(self.settings, self.stage.now, self._book).equation
+        self.invalidate()
+        equation = self.facts.equation
         shown = self.settings.equation if equation is None else equation.id
         return {"equation": shown} if shown else {}
 
-    def on_leave(self) -> None:
-        self._stop_deriving()
-
-    def remove(self) -> None:
-        self._stop_deriving()
-        super().remove()
-
     def formulas(self) -> tuple[Formula, ...]:
-        return () if self._book is None else views.formulas(self._book)
+        return () if self.facts.book is None else views.formulas(self.facts.book)
 
     # What is shown
 
     def panel(self) -> Sequence[Node]:
         f, units = self.read, self.stage.units
-        nodes: list[Node] = [Html(views.message, (self._words,), key="about")]
+        nodes: list[Node] = [Html(views.message, (f.about,), key="about")]
         book, equation = f.book, f.equation
         test, symbols = list[Node](), list[Node]()
         if self.hides("equations"):
@@ -134,53 +120,6 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         detail = f"As printed, {equation.entry} is off by {error} here."
         notice = Notice("hand", f"Equation ({equation.number}) at its worst", detail)
         self.stage.move_to(np.array(equation.worst), notice)
-
-    def on_ready(self) -> None:
-        """Take the derived book, or the reason why there is none."""
-        if self._derivation is None or not self._derivation.finished or self._book is not None:
-            return  # of a robot that is no longer selected
-        try:
-            self._book = self._derivation.future.result()
-        except DerivationError as error:
-            self._words = f"No equations: {error}."
-            self.stage.notify(Notice("error", "No equations for this arm", str(error)))
-            return
-        except Exception:
-            self._words = "The equations of this arm could not be derived."
-            raise
-        self._words = views.summary(self._book)
-
-    # Long work
-
-    def advance(self, now: float) -> float | None:
-        if self._derive_at is None:
-            return None
-        if now < self._derive_at:
-            return self._derive_at - now
-        self._derive()
-        self.schedule()
-        return None
-
-    def _derive(self) -> None:
-        """Ask for the equations of the arm on show."""
-        self._derive_at = None
-        try:
-            self._derivation = derivation = book_later(self.stage.now.robot)
-        except NotDerivedError as error:
-            self._words = f"No equations for so many rows: {error}."
-            return
-        if derivation.finished:
-            self.on_ready()
-        else:
-            ready = self.event(self.on_ready)
-            derivation.future.add_done_callback(lambda _: self.post(("done", ready)))
-
-    def _stop_deriving(self) -> None:
-        """Wait no more; unless somebody else waits for the same equations, they are not derived."""
-        self._derive_at = None
-        if self._derivation is not None:
-            self._derivation.leave()
-            self._derivation = None
 
 
 def _misprint(f: EquationsFacts) -> list[SceneNode]:

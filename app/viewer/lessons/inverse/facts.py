@@ -20,15 +20,7 @@ from kin import Robot
 
 @dataclass(frozen=True, eq=False)
 class InverseFacts(Facts[InverseSettings]):
-    """See the module; all but `exists` is known only of arms with a derivation.
-
-    Attributes:
-        step: the index of the step on show; beyond the last one during the check.
-        answered: for each step, whether its numbers may be on show.
-    """
-
-    step: int = 0
-    answered: tuple[bool, ...] = ()
+    """See the module; all but `exists` is known only of arms with a derivation."""
 
     @property
     def exists(self) -> bool:
@@ -50,7 +42,8 @@ class InverseFacts(Facts[InverseSettings]):
     @property
     def opened(self) -> tuple[bool, ...]:
         """For each step, whether its numbers are on show."""
-        return tuple(self.settings.all or answered for answered in self.answered or (False,) * len(self.keys))
+        s = self.settings
+        return tuple(s.all or answered for answered in s.answered or (False,) * len(self.keys))
 
     @property
     def exercise(self) -> Exercise:

@@ -27,7 +27,7 @@ from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.inverse import views
 from app.viewer.lessons.inverse.derive import signs_of
 from app.viewer.lessons.inverse.drawing import figure, room
-from app.viewer.lessons.inverse.exercise import flipped
+from app.viewer.lessons.inverse.exercise import Exercise, flipped
 from app.viewer.lessons.inverse.facts import InverseFacts
 from app.viewer.lessons.inverse.questions import outline, outline_of
 from app.viewer.lessons.inverse.settings import InverseSettings
@@ -56,7 +56,6 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     pace = 0.1
 
     def __init__(self, stage: Stage) -> None:
-        self._restart = self._drawn = False
         self._arms: dict[Robot, InverseSettings] = {}  # what was asked and followed on other arms
         super().__init__(stage)
 
@@ -65,23 +64,15 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         return "configuration"
 
     def started(self) -> None:
-        self._robot = self.stage.now.robot
-        if (own := self._arms.get(self._robot)) is not None:
+        if (own := self._arms.get(self.stage.now.robot)) is not None:
             self.change(q=own.q, signs=own.signs, taken=own.taken)
-        self._at, self._answered = 0, tuple[bool, ...]()
-        self._figure = FigureNodes(body(self.stage.now.robot).size)
-        self._figure_of: StepKey = "centre"
-        f = self.compute_facts()
-        if f.exists or self._drawn:
+        self._figures = dict[StepKey, FigureNodes]()  # labels of one step take no room from those of another
+        self.invalidate()
+        f = self.facts
+        if f.exists or self.settings.drawn:
             self.stage.see_through(f.exists, gizmo=f.exists)
             self.stage.fit_view(room(f.derived, f.followed.derivation, f.keys) if f.exists else ())
-        self._drawn = f.exists
-
-    def extra_dependencies(self) -> tuple[object, ...]:
-        return self._at, self._answered
-
-    def compute_facts(self) -> InverseFacts:
-        return InverseFacts(self.settings, self.stage.now, self._at, self._answered)
+        self.change(drawn=f.exists)
 
     # What is shown
 
@@ -94,7 +85,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
             ]
             return [Html(views.others_html, (f.robot,), key="others"), *arms]
         opened = dict(zip(f.keys, f.opened, strict=True))
-        numbers = f.derived, f.followed, f.keys, f.opened, f.step, units
+        numbers = f.derived, f.followed, f.keys, f.opened, self.settings.step, units
         inside = sum(branch.available for branch in f.branches)
         follow = {str(b.number): self.event(self.on_follow, i) for i, b in enumerate(f.branches)}
         return [
@@ -114,31 +105,36 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     def _shapes(self, *args: object) -> Sequence[SceneNode]:
         """The figure of the step on show; the check has that of the whole posture."""
         f = self.read
-        at = min(f.step, len(f.keys) - 1)
-        if self._figure_of != f.keys[at]:  # labels of another step take no room
-            self._figure, self._figure_of = FigureNodes(self._figure.size), f.keys[at]
-        return figure(f.derived, f.followed.derivation, f.keys[at], self._figure, self.stage.units, f.opened[at])
+        at = min(f.settings.step, len(f.keys) - 1)
+        nodes = self._figures.setdefault(f.keys[at], FigureNodes(body(f.robot).size))
+        return figure(f.derived, f.followed.derivation, f.keys[at], nodes, self.stage.units, f.opened[at])
 
     # The steps
 
     def on_steps(self, progress: Progress) -> Outline | None:
-        if self._robot is not self.stage.now.robot or not self.facts.exists:
+        if self.facts.robot is not self.stage.now.robot or not self.facts.exists:
             return None
-        if self._restart:
+        if self.settings.restart:
             progress.restart()
-            self._restart = False
-            self.change(taken={})
+            self.change(restart=False, taken={})
         units = self.stage.units
-        progress.use(outline_of(self.compute_facts().exercise, units))
+        progress.use(outline_of(self._exercise, units))
         for number, key in enumerate(self.facts.keys, 1):
             self._take_way(progress, str(number), key)
         asked = dict(progress.outline.questions())
-        self._at, numbers = progress.at, [str(i + 1) for i in range(len(self.facts.keys))]
-        self._answered = tuple(
+        numbers = [str(i + 1) for i in range(len(self.facts.keys))]
+        answered = tuple(
             progress.is_closed(number) if number in asked else i <= progress.at for i, number in enumerate(numbers)
         )
+        self.change(step=progress.at, answered=answered)
         self.schedule()
         return progress.outline
+
+    @property
+    def _exercise(self) -> Exercise:
+        """What the questions are about now."""
+        self.invalidate()
+        return self.facts.exercise
 
     def _take_way(self, progress: Progress, number: str, key: StepKey) -> None:
         """Follow the other way where the student has typed it."""
@@ -148,17 +144,17 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         if self.settings.taken.get(number) == answer:
             return
         self.change(taken={**self.settings.taken, number: answer})
-        given = self.compute_facts().exercise
+        given = self._exercise
         step = given.followed.derivation.step(key)
         if question.way_of(answer) > 0 and step is not None and step.split >= 0:
             self.change(signs=flipped(given.signs, step.split))
-            progress.use(outline_of(self.compute_facts().exercise, self.stage.units))
+            progress.use(outline_of(self._exercise, self.stage.units))
 
     # Events
 
     def on_offer(self) -> None:
         """Go on with the branch that a step offers where the derivation has ended."""
-        if (back := self.compute_facts().exercise.way_back) is not None:
+        if (back := self._exercise.way_back) is not None:
             self.on_follow(back.number - 1)
 
     def on_follow(self, index: int) -> None:
@@ -181,8 +177,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     def on_ask(self) -> None:
         """Ask about the pose that the arm has now."""
         q = self.stage.now.goal
-        self.change(q=as_configuration(q), signs=signs_of(self.facts.derived, q))
-        self._restart = True
+        self.change(q=as_configuration(q), signs=signs_of(self.facts.derived, q), restart=True)
         self.stage.activity.changed()
         self.stage.notify(Notice("hand", "New questions", "They are about the pose that the arm has now."))
 
@@ -196,10 +191,10 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def on_result(self, result: kin.IKResult) -> None:
         self.change(turned=False)
-        self.schedule()
+        super().on_result(result)
 
     def on_robot(self) -> None:
-        self._arms[self._robot] = self.settings
+        self._arms[self.facts.robot] = self.settings
         super().on_robot()
         self.stage.activity.changed()
 
@@ -212,6 +207,6 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def remove(self) -> None:
         super().remove()
-        if self._drawn:
+        if self.settings.drawn:
             self.stage.see_through(False)
             self.stage.fit_view(())

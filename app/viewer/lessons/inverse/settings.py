@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from app.viewer.declared.fields import Settings, flag, kept, numbers, numbers_by_name, slider
+from app.viewer.declared.fields import Settings, flag, kept, memory, numbers, numbers_by_name, slider
 from app.viewer.lessons.guide.outline import Configuration
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.inverse.arm import arm_of
@@ -51,6 +51,10 @@ class InverseSettings(Settings):
         all: whether the numbers of all steps are on show.
         taken: answers whose way was followed, by question: the student may have left it since.
         psi: the arm angle of the derivation, if it is `turned`; it follows the arm otherwise.
+        step: the index of the step on show; beyond the last one during the check.
+        answered: for each step, whether its numbers may be on show.
+        restart: whether the questions are asked again.
+        drawn: whether a figure was drawn last.
     """
 
     q: Configuration = kept(_q, to_json=list, from_json=_read_q)
@@ -70,4 +74,8 @@ class InverseSettings(Settings):
         clip=True,
         link=False,
     )
-    turned: bool = kept(False, link=False, renew=True)
+    turned: bool = memory(False)
+    step: int = memory(0)
+    answered: tuple[bool, ...] = memory(())
+    restart: bool = memory(False, renew=False)
+    drawn: bool = memory(False, renew=False)

@@ -45,15 +45,19 @@ class Iterated:
 
 @dataclass(frozen=True, eq=False)
 class NumericFacts(Facts[NumericSettings]):
-    """See the module.
+    """See the module."""
 
-    Attributes:
-        iterated: the iterations that have ended last; None: there are none yet.
-        basins: the picture of the starts, if it is complete.
-    """
+    @property
+    def iterated(self) -> Iterated | None:
+        """The iterations that have ended last; None: there are none yet."""
+        found: Iterated | None = self.work("iterates").value
+        return found
 
-    iterated: Iterated | None = None
-    basins: Basins | None = None
+    @property
+    def basins(self) -> Basins | None:
+        """The picture of the starts, if it is complete."""
+        found: Basins | None = self.work("basins").value
+        return found
 
     @property
     def problem(self) -> Problem:

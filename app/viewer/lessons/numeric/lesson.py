@@ -9,21 +9,19 @@ Iterations and pictures are computed in slices of some milliseconds, whenever th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
-
-import numpy as np
 
 import kin
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
+from app.viewer.declared.work import Sweep, Work
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.numeric import basins, views
-from app.viewer.lessons.numeric.basins import Picture
 from app.viewer.lessons.numeric.drawing import scene
-from app.viewer.lessons.numeric.facts import Iterated, NumericFacts
+from app.viewer.lessons.numeric.facts import NumericFacts
 from app.viewer.lessons.numeric.questions import outline
 from app.viewer.lessons.numeric.settings import NumericSettings
 from app.viewer.panel.status import Notice
@@ -51,20 +49,6 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     def started(self) -> None:
         self._figure = FigureNodes(body(self.stage.now.robot).size)
-        self._picture = Picture()
-        self._work: Iterator[Iterated | None] | None = None
-        self._iterated: Iterated | None = None
-        self._asked: tuple[object, ...] = ()  # what the iterations were begun for
-        self._begun = self.stage.now.q  # where they were begun
-        self._restarted = 0.0
-        self._plays, self._next = False, 0.0  # when the next iterate is played
-        self._in_view = False
-
-    def extra_dependencies(self) -> tuple[object, ...]:
-        return self._iterated, self._picture.found
-
-    def compute_facts(self) -> NumericFacts:
-        return NumericFacts(self.settings, self.stage.now, self._iterated, self._picture.found)
 
     def remove(self) -> None:
         super().remove()
@@ -130,20 +114,18 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
         """Show another iterate, or play them."""
         f, at = self.facts, self.settings.at
         if f.iterated is None:  # still being computed
-            self._plays = name == "Run"
-            self.change(at=0 if name in ("First", "Run") else at)
+            self.change(plays=name == "Run", at=0 if name in ("First", "Run") else at)
             return
-        last = f.iterated.run.count
+        last, plays = f.iterated.run.count, False
         if name == "Run":
-            self._plays, self._next = not self._plays, 0.0
-            at = 0 if self._plays and f.number == last else f.number
+            plays = not self.settings.plays
+            at = 0 if plays and f.number == last else f.number
         elif name == "Next":
             at = min(f.number + 1, last)
-            self._plays = self._plays and at < last
+            plays = self.settings.plays and at < last
         else:
-            self._plays = False
             at = 0 if name == "First" else max(0, f.number - 1)
-        self.change(at=at)
+        self.change(plays=plays, at=at)
 
     def on_take(self) -> None:
         """Move the arm to the iterate on show."""
@@ -160,48 +142,27 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     # Iterating
 
-    def advance(self, now: float) -> float | None:
-        self.invalidate()
-        wait = self._renew(now)
-        if self._work is not None:
-            if (found := next(self._work)) is not None:
-                self._finish(found)
-            return 0.0
-        if self._picture.work():
-            if self._picture.found is not None:
-                self.schedule()
-            return 0.0
-        if self._plays:
-            if now >= self._next:
-                self._next = now + PACE
-                self.on_move("Next")
-                self.schedule()
-            wait = min(wait or PACE, max(0.0, self._next - now))
-        return wait
+    def running(self) -> Sequence[Work | Sweep]:
+        f, s = self.facts, self.settings
+        asked = f.problem, f.options, s.compare, f.start
+        works: list[Work | Sweep] = [Work("iterates", lambda *_: f.iterate(), asked, pace=INTERVAL, keep=True)]
+        if s.picture:
+            works.append(Work("basins", basins.search, (f.pictured, f.options)))
+        if s.plays and f.iterated is not None:
+            works.append(Sweep(self._play, PACE))
+        return works
 
-    def _ask(self) -> tuple[object, ...]:
-        return self.facts.problem, self.facts.options, self.settings.compare, self.settings.picture
+    def _play(self, seconds: float) -> None:
+        self.on_move("Next")
 
-    def _renew(self, now: float) -> float | None:
-        """Iterate anew for other settings or another start; returns in how many seconds, if not yet."""
-        f, asked = self.facts, self._ask()
-        if asked == self._asked:
-            if self._work is not None or np.array_equal(f.start, self._begun):
-                return None
-            if (wait := INTERVAL - (now - self._restarted)) > 0.0:
-                return wait
-        self._asked, self._begun, self._restarted = asked, f.start, now
-        self._work = f.iterate()
-        self._picture.use(f.pictured if self.settings.picture else None, f.options)
-        return None
-
-    def _finish(self, found: Iterated) -> None:
-        """Show iterations that have ended."""
-        self._work, self._iterated = None, found
-        if self.settings.at is not None:
-            self.change(at=min(self.settings.at, found.run.count))
-        if not self._in_view:  # once for each arm: the view does not follow the iterates
-            self._in_view = True
+    def worked(self, key: str) -> None:
+        super().worked(key)
+        s, found = self.settings, self.facts.iterated
+        if found is None:
+            return
+        if s.at is not None:
+            self.change(at=min(s.at, found.run.count))
+        if not s.fits:  # the view does not follow the iterates
+            self.change(fits=True)
             frames = kin.link_frames(found.problem.robot, found.run.q)
             self.stage.fit_view((), frames[..., :3, 3].reshape(-1, 3))
-        self.schedule()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import kin
-from app.viewer.declared.fields import Settings, choice, flag, kept, numbers, ordinal, slider
+from app.viewer.declared.fields import Settings, choice, flag, kept, memory, numbers, ordinal, slider
 from app.viewer.lessons.numeric.example import example, usual_match
 from app.viewer.lessons.numeric.iteration import Match, Method
 from app.viewer.lessons.numeric.views import NAMES
@@ -61,6 +61,8 @@ class NumericSettings(Settings):
         start: where the iterations begin; None: where the arm is.
         follow: what the visitor has last asked for; `start` is what counts.
         at: the iterate on show; None: the last one.
+        plays: whether iterates are shown one after another.
+        fits: whether the view was fitted to the iterates, once for each arm.
     """
 
     method: Method = choice("Method", {name: key for key, name in NAMES.items()}, "newton", hint=METHOD_HINT)
@@ -75,3 +77,5 @@ class NumericSettings(Settings):
     at: int | None = kept(None, from_json=_read_at, renew=True)
     compare: bool = flag("Compare all methods", hint=COMPARE_HINT)
     picture: bool = flag("Basins of attraction", hint=PICTURE_HINT)
+    plays: bool = memory(False)
+    fits: bool = memory(False)

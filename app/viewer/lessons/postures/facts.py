@@ -7,26 +7,32 @@ from functools import cached_property
 
 import kin
 from app.viewer.declared.facts import Facts
+from app.viewer.lessons.postures.directions import Cone
 from app.viewer.lessons.postures.remedies import Remedy
 from app.viewer.lessons.postures.settings import PosturesSettings, names_of
 from app.viewer.lessons.postures.survey import CLOSEST, Posture, survey
 from kin import IKResult
-from kin.units import DEFAULT_UNITS, Units
 
 
 @dataclass(frozen=True, eq=False)
 class PosturesFacts(Facts[PosturesSettings]):
-    """See the module.
+    """See the module."""
 
-    Attributes:
-        units: those of the sentences.
-        result: the answer to the target; None: the tool is there.
-        offers: what would help, as far as it was tried.
-    """
+    @property
+    def result(self) -> IKResult | None:
+        """The answer to the target; None: the tool is there."""
+        return None if self.arm.target is None else self.settings.result
 
-    units: Units = DEFAULT_UNITS
-    result: IKResult | None = None
-    offers: tuple[Remedy, ...] = ()
+    @property
+    def offers(self) -> tuple[Remedy, ...]:
+        """What would help, as far as it was tried."""
+        return self.work("remedies").value or ()
+
+    @property
+    def cone(self) -> Cone | None:
+        """The directions at the target, if they are wanted."""
+        found: Cone | None = self.work("cone").value
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ The list is updated at most ten times a second; remedies are searched only when 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
@@ -20,6 +19,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Work
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.postures import remedies
 from app.viewer.lessons.postures.directions import Cone, cone_html, has_cone
@@ -34,6 +34,8 @@ from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
 from kin import IKResult, Robot
+from kin.transforms import Array
+from kin.units import Units
 from kin.warmup import ALL
 
 CONE_INTERVAL = 0.2
@@ -60,31 +62,13 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
     def left(robot: Robot) -> Left:
         return "configuration" if is_planar(robot) else "nothing"
 
-    def started(self) -> None:
-        self._result: IKResult | None = None
-        self._answered = self._drawn = 0.0
-        self._asked: tuple[object, ...] = ()  # what remedies are searched for
-        self._search: Iterator[Remedy | None] | None = None
-        self._offers: tuple[Remedy, ...] = ()
-        self._cone: Cone | None = None
-
-    def extra_dependencies(self) -> tuple[object, ...]:
-        return self._result, self.stage.units, self._offers
-
-    def compute_facts(self) -> PosturesFacts:
-        arm, units = self.stage.now, self.stage.units
-        if arm.target is None:  # the arm has reached the target, or was moved elsewhere
-            self._result = None
-        offers = self._offers if self._asked == (self._result, units) else ()
-        return PosturesFacts(self.settings, arm, units, self._result, offers)
-
     # What is shown
 
     def panel(self) -> Sequence[Node]:
         f, robot = self.read, self.read.robot
         numbers = tuple(str(i + 1) for i in range(len(f.names)))
         fixes = [
-            Button(fix.label, self.event(self.on_remedy, i), fix.hint or None, key=str(i), of=self._asked)
+            Button(fix.label, self.event(self.on_remedy, i), fix.hint or None, key=str(i), of=(f.result, f.units))
             for i, fix in enumerate(f.offers)
         ]
         go = {number: self.event(self.on_go, i) for i, number in enumerate(numbers)}
@@ -101,8 +85,8 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         ]
         if has_cone(robot):
             nodes.append(Control("cone"))
-            if self._cone is not None and self.settings.cone:
-                nodes.append(Html(cone_html, (self._cone.patch.share,), key="share"))
+            if f.cone is not None:
+                nodes.append(Html(cone_html, (f.cone.patch.share,), key="share"))
         if not kin.branch_names(robot) and not self.hides("postures"):
             nodes.append(Html(_note, key="unnamed"))
         return nodes
@@ -122,8 +106,8 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         f, nodes = self.read, list[Lazy]()
         if not self.hides("postures"):
             nodes.append(Lazy("ghosts", self._ghosts, (f.robot, f.postures, f.seen - {f.present})))
-        if self._cone is not None and self.settings.cone:
-            nodes.append(Lazy("cone", Cone.nodes, (self._cone,)))
+        if f.cone is not None:
+            nodes.append(Lazy("cone", Cone.nodes, (f.cone,)))
         return nodes
 
     def _ghosts(self, *args: object) -> list[SceneNode]:
@@ -168,56 +152,32 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
                 self.stage.move_to(remedy.q, Notice("hand", title, "The tool can reach it there."))
 
     def on_result(self, result: IKResult) -> None:
-        self._result, self._answered = result, time.perf_counter()
-        # While a target is dragged there are many: the panel keeps its pace.
-        self.schedule(max(1e-3, self.pace - (self._answered - self.shown_at)))
-
-    def on_request(self) -> None:
-        self.schedule()
-
-    def on_obstacles(self) -> None:
-        self.schedule()
+        self.change(result=result)
+        super().on_result(result)
 
     # Long work
 
-    def advance(self, now: float) -> float | None:
-        self.invalidate()
-        waits = self._draw_cone(now), self._try_remedies(now)
-        return min((wait for wait in waits if wait is not None), default=None)
+    def running(self) -> Sequence[Work]:
+        f, works = self.facts, list[Work]()
+        if self.settings.cone and has_cone(f.robot):
+            works.append(Work("cone", self._cone, (f.arm.aim,), pace=CONE_INTERVAL, keep=True))
+        if f.result is not None and f.result.status != "solved":
+            works.append(Work("remedies", self._remedies, (f.result, f.units), rest=QUIET))
+        return works
 
-    def _draw_cone(self, now: float) -> float | None:
-        """Compute the directions at the target; returns in how many seconds, if not yet."""
-        robot, T = self.facts.robot, self.facts.arm.aim
-        if not self.settings.cone or not has_cone(robot) or (self._cone is not None and self._cone.is_near(T)):
-            return None
-        if (wait := CONE_INTERVAL - (now - self._drawn)) > 0.0:
-            return wait
-        self._drawn = now
-        self._cone = Cone.of(robot, T) if self._cone is None else self._cone.at(T)
-        self.schedule()
-        return None
+    def _cone(self, T: Array) -> Cone:
+        """The directions at the target."""
+        last = self.facts.cone
+        if last is None:
+            return Cone.of(self.facts.robot, T)
+        return last if last.is_near(T) else last.at(T)
 
-    def _try_remedies(self, now: float) -> float | None:
-        """Try one thing that may help; returns in how many seconds to go on."""
-        f = self.facts
-        if f.result is None or f.result.status == "solved":
-            return None
-        if self._asked != (asked := (f.result, f.units)):
-            if (wait := QUIET - (now - self._answered)) > 0.0:
-                return wait
-            request = Request(f.robot, f.arm.aim, f.arm.options, f.arm.goal, f.result)
-            self._asked, self._offers, self._search = asked, (), remedies.remedies(request, f.units)
-        if self._search is None:
-            return None
-        try:
-            remedy = next(self._search)
-        except StopIteration:
-            self._search = None
-            return None
-        if remedy is not None:
-            self._offers = (*self._offers, remedy)
-            self.schedule()
-        return 0.0
+    def _remedies(self, result: IKResult, units: Units) -> Iterator[tuple[Remedy, ...]]:
+        """Try one thing after another that may help."""
+        f, found = self.facts, tuple[Remedy, ...]()
+        for remedy in remedies.remedies(Request(f.robot, f.arm.aim, f.arm.options, f.arm.goal, result), units):
+            found = found if remedy is None else (*found, remedy)
+            yield found
 
 
 def _note() -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import kin
-from app.viewer.declared.fields import Settings, flag, kept, subset
+from app.viewer.declared.fields import Settings, flag, kept, memory, subset
 from app.viewer.lessons.postures.survey import CLOSEST
-from kin import Robot
+from kin import IKResult, Robot
 
 ALL_GHOSTS_HINT = "Shows all postures as translucent copies of the arm; grey ones are outside the limits"
 CONE_HINT = (
@@ -26,8 +26,9 @@ def _read_hidden(entry: object, robot: Robot) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class PosturesSettings(Settings):
-    """See the module; `hidden` are the names of the postures without a ghost."""
+    """See the module; `hidden` are the names of the postures without a ghost, `result` is the last answer."""
 
     ghosts: bool = flag("Ghosts", True, hint=ALL_GHOSTS_HINT)
     cone: bool = flag("Approach cone", True, hint=CONE_HINT)
     hidden: frozenset[str] = kept(frozenset(), to_json=sorted, from_json=_read_hidden, renew=True)
+    result: IKResult | None = memory()

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from app.viewer.declared.scene import Color, Lazy, Node, bars, label, lines
 from app.viewer.lessons.redundancy.facts import RedundancyFacts
 from app.viewer.lessons.redundancy.path import elbow_paths, has_path
-from app.viewer.lessons.redundancy.ring import FLAT, Circle, arc_segments, elbow_circle, trade_segments
+from app.viewer.lessons.redundancy.ring import FLAT, Circle, Ring, arc_segments, elbow_circle, trade_segments
 from app.viewer.scene.bodies.parts import JOINT_COLORS
 from app.viewer.scene.meshes import body
 from app.viewer.self_motion import End
@@ -30,27 +28,10 @@ FEASIBLE, BLOCKED, LIMIT, NOW, ELBOW, LINE = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """What the ring is about; it changes with the target, not during a self-motion.
-
-    Attributes:
-        goal, T_held: where the arm was heading ``(n,)``, and where the tool is held ``(4, 4)``.
-        item: the parameter whose values are drawn; None: there is nothing to draw.
-        ends: of its ranges.
-    """
-
-    robot: Robot
-    goal: Array
-    T_held: Array
-    item: Redundancy | None
-    ends: tuple[End, ...]
-
-
-def scene(read: RedundancyFacts, ring: Ring | None) -> list[Node | Lazy]:
+def scene(read: RedundancyFacts) -> list[Node | Lazy]:
     """All drawings, of the facts that the panel shows."""
     present = Lazy("present", _present, (read,))
-    return [present] if ring is None else [present, Lazy("ring", _ring, (ring,))]
+    return [present] if read.ring is None else [present, Lazy("ring", _ring, (read.ring,))]
 
 
 def _ring(ring: Ring) -> list[Node]:

@@ -9,29 +9,38 @@ import numpy as np
 
 from app.viewer.declared.facts import Facts
 from app.viewer.lessons.redundancy import views
-from app.viewer.lessons.redundancy.ring import Circle, coaxial, elbow_circle
-from app.viewer.lessons.redundancy.settings import RedundancySettings
+from app.viewer.lessons.redundancy.ring import Circle, Ring, coaxial, elbow_circle
+from app.viewer.lessons.redundancy.settings import Held, RedundancySettings
 from app.viewer.self_motion import leaders, redundancy_at
 from kin.ik import Redundancy
-from kin.transforms import Array
 
 
 @dataclass(frozen=True, eq=False)
 class RedundancyFacts(Facts[RedundancySettings]):
-    """See the module.
+    """See the module."""
 
-    Attributes:
-        T_held: where the tool is held ``(4, 4)``.
-        shape: the origins of the links' frames when the tool was last released.
-    """
+    @property
+    def is_held(self) -> bool:
+        """Whether the arm is where the lesson has sent it."""
+        held = self.settings.held
+        return held is not None and np.array_equal(held.q, self.arm.goal)
 
-    T_held: Array
-    shape: Array
+    @cached_property
+    def held(self) -> Held:
+        """Where the tool is held: where it is heading, if something else has moved the arm."""
+        held = self.settings.held
+        return held if held is not None and self.is_held else Held.at(self.robot, self.arm.goal)
+
+    @property
+    def ring(self) -> Ring | None:
+        """What the ring is about, once the ends of the ranges are known."""
+        found: Ring | None = self.work("ring").value
+        return found
 
     @cached_property
     def exact(self) -> tuple[Redundancy, ...]:
         """The parameters of a closed form."""
-        return redundancy_at(self.robot, self.T_held, self.arm.options, self.arm.goal)
+        return redundancy_at(self.robot, self.held.T, self.arm.options, self.arm.goal)
 
     @property
     def numeric(self) -> bool:
@@ -68,14 +77,14 @@ class RedundancyFacts(Facts[RedundancySettings]):
     @cached_property
     def residual(self) -> tuple[float, float | None]:
         """Position and rotation error of the tool in the scene, by forward kinematics."""
-        return views.residual(self.T, self.T_held, self.arm.task)
+        return views.residual(self.T, self.held.T, self.arm.task)
 
     @cached_property
     def moved(self) -> float | None:
         """How far the arm has moved (m) where it should not: in a trade of two coaxial joints."""
         if not self.trades:
             return None
-        return float(np.linalg.norm(views.frame_origins(self.robot, self.q) - self.shape, axis=1).max())
+        return float(np.linalg.norm(views.frame_origins(self.robot, self.q) - self.held.shape, axis=1).max())
 
     @cached_property
     def idea(self) -> str:

@@ -15,20 +15,21 @@ from dataclasses import replace
 
 import numpy as np
 
-import kin
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Control, Html, Node
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Sweep, Work
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.redundancy import views
-from app.viewer.lessons.redundancy.drawing import Ring, scene
+from app.viewer.lessons.redundancy.drawing import scene
 from app.viewer.lessons.redundancy.facts import RedundancyFacts
 from app.viewer.lessons.redundancy.questions import outline
-from app.viewer.lessons.redundancy.settings import RedundancySettings
+from app.viewer.lessons.redundancy.ring import Ring
+from app.viewer.lessons.redundancy.settings import MOVING, RedundancySettings
 from app.viewer.panel.posture import on_side_of
 from app.viewer.panel.status import Notice
-from app.viewer.self_motion import INSET, SMOOTH, End, ends, range_of, self_motion
+from app.viewer.self_motion import INSET, SMOOTH, circular, ends, range_of, self_motion
 from kin import IKResult
 from kin.differential.null_space import lead, within
 from kin.ik import Redundancy
@@ -39,7 +40,7 @@ FRAME = 1 / 30
 QUIET = 0.2  # seconds at rest before the joint limits at the ends of the range are determined
 SPEED = 0.9  # rad/s of the redundancy parameter
 NEAR = 1e-9  # rad
-MOVING = Notice("reached", "Self-motion", "The arm moves, the tool does not.")
+TURN = 2.0 * math.pi
 BLOCKED = Notice(
     "limits", "The self-motion ends here", "A joint is at its limit, or the joint cannot lead further."
 )
@@ -55,24 +56,6 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
     outline = staticmethod(outline)
     settings_of, facts_of = RedundancySettings, RedundancyFacts
 
-    def started(self) -> None:
-        self._target: float | None = None  # value the slider was set to
-        self._up = True
-        self._arrival = MOVING  # the notice on arrival at the target value
-        self._item: Redundancy | None = None  # the parameter that is changed, at the configuration sent last
-        self._side = 0.0  # on which side of zero the slider shows half a turn
-        self._ring: Ring | None = None
-        self._ends_key: tuple[object, ...] = ()
-        self._stepped = self._changed = 0.0
-        self._hold()
-
-    def compute_facts(self) -> RedundancyFacts:
-        arm = self.stage.now
-        if not np.array_equal(self._sent, arm.goal):  # something else has moved the arm
-            self._stop()
-            self._hold()
-        return RedundancyFacts(self.settings, arm, self._T_held, self._shape)
-
     # What is shown
 
     def panel(self) -> Sequence[Node]:
@@ -80,11 +63,11 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         nodes = [*self.unless_asked("null space", Html(views.idea_html, (f.idea,)))]
         if item is not None:
             nodes += self._controls(item)
-            item = on_side_of(self._side, item, units.angles)
+            item = self._on_side(item)
         bar = () if item is None or f.numeric else (Html(views.range_html, (f.robot, item, units)),)
         nodes += bar
-        if self._ring is not None and self._exact(f) is not None:
-            nodes.append(Html(views.limits_html, (f.robot, self._ring.ends, units), key="limits"))
+        if f.ring is not None and item is not None and not f.numeric:
+            nodes.append(Html(views.limits_html, (f.robot, f.ring.ends, units), key="limits"))
         if item is not None:
             nodes.append(Html(views.residual_html, (*f.residual, f.moved, units), key="residual"))
         return nodes
@@ -98,189 +81,138 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
             nodes.append(Control("free", spec=spec, value=item.name, of=(f.robot.id, names)))
         nodes.append(Control("swing"))
         range_ = views.bounds(f.robot, item)
-        value = (
-            on_side_of(self._side, item, self.stage.units.angles).value if self._target is None else self._target
-        )
-        self._side = self.stage.units.angles.shown(min(max(value, range_[0]), range_[1]))
+        value = self._on_side(item).value if self.settings.target is None else self.settings.target
         spec = replace(self.spec("value"), limits=range_, slider=range_)
         label = f"Set {item.label.split()[-1]} (tool held)"
         of = (f.robot.id, item.name, names)
         return [*nodes, Control("value", label=label, spec=spec, value=value, of=of)]
 
     def scene(self) -> Sequence[SceneNode | Lazy]:
-        return scene(self.read, self._ring)
-
-    def refresh(self) -> None:
-        before = getattr(self, "read", None)
-        super().refresh()
-        self._item = self.read.item
-        if self.read is not before:
-            self._changed = self.shown_at
-            self.schedule(QUIET)
+        return scene(self.read)
 
     def restore(self, state: dict[str, object]) -> None:
-        if not np.array_equal(self._sent, self.stage.now.goal):
-            self._stop()
-            self._hold()  # first, or a sweep that is asked for would end at once
+        self.change(held=None, target=None)  # a sweep that is asked for begins where the arm is then
         super().restore(state)
 
     def state(self) -> dict[str, object]:
         return {**super().state(), "free": "" if self.read.item is None else self.read.item.name}
 
-    @staticmethod
-    def _exact(facts: RedundancyFacts) -> Redundancy | None:
-        return None if facts.numeric else facts.item
-
-    def _show_ends(self, now: float, moving: bool) -> float | None:
-        """Determine the ends of the ranges; returns in how many seconds, if not yet.
-
-        The ranges of an arm angle depend on the target and the branch; they are constant during a self-motion.
-        """
-        f, item = self.read, self.read.item
-        key: tuple[object, ...] = (
-            f.T_held.tobytes(),
-            f.arm.task,
-            f.arm.options.constraints,
-            None if item is None else (item.name, np.round(item.intervals, 6).tobytes()),
-        )
-        if key == self._ends_key:
-            return None
-        if not moving and (wait := QUIET - (now - self._changed)) > 0.0:
-            return wait
-        self._ends_key = key
-        exact = self._exact(f)
-        found = () if exact is None else ends(f.robot, f.T_held, f.arm.options, f.arm.goal, exact)
-        shown = exact if f.arm.task == "pose" or (exact is not None and exact.name == "psi") else None
-        self._ring = Ring(f.robot, f.arm.goal, f.T_held, shown, found)
-        self.schedule()
-        return None
-
     # Events
 
     def changed(self, path: str) -> None:
-        self._target = None
+        self.change(held=self.facts.held, target=None)
         if path == "value":
             self.change(swing=False)
-            self._target = self._bounded(self.settings.value)
+            self._approach(self.settings.value)
 
     def on_result(self, result: IKResult) -> None:
         # The visitor has set a target, which has priority over the self-motion.
-        self._stop()
-        self.schedule()
+        self.change(swing=False, target=None)
+        if self.read.item is not None:
+            self.change(side=self._on_side(self.read.item).value)
+        super().on_result(result)
 
     def on_request(self) -> None:
-        self._target = None
-        self.schedule()
+        self.change(target=None)
+        super().on_request()
+
+    # The ends of the ranges
+
+    def running(self) -> Sequence[Work | Sweep]:
+        f, s, item = self.read, self.settings, self.read.item
+        values = None if item is None else (item.name, np.round(item.intervals, 6))
+        # The ranges of an arm angle depend on the target and the branch; they are constant during a self-motion.
+        depends = f.held.T, f.arm.task, f.arm.options.constraints, values
+        found: list[Work | Sweep] = [Work("ring", lambda *_: self._ring(f), depends, rest=QUIET, keep=True)]
+        if s.swing or s.target is not None:
+            found.append(Sweep(self._step, FRAME))
+        return found
+
+    @staticmethod
+    def _ring(f: RedundancyFacts) -> Ring:
+        exact = None if f.numeric else f.item
+        found = () if exact is None else ends(f.robot, f.held.T, f.arm.options, f.arm.goal, exact)
+        shown = exact if f.arm.task == "pose" or (exact is not None and exact.name == "psi") else None
+        return Ring(f.robot, f.arm.goal, f.held.T, shown, found)
 
     # The motion
 
-    def advance(self, now: float) -> float | None:
-        self.invalidate()
-        again = None
-        if moving := self._target is not None or self.settings.swing:
-            again = FRAME - (now - self._stepped)
-            if again <= 0.0:
-                self._step(min(now - self._stepped, 2.0 * FRAME))
-                self._stepped, again = now, FRAME
-        wait = self._show_ends(now, moving)
-        return min((x for x in (again, wait) if x is not None), default=None)
-
-    def _hold(self) -> None:
-        """Hold the tool where the arm is heading, from now on."""
-        arm = self.stage.now
-        self._sent = arm.goal.copy()
-        self._T_held = kin.fk(arm.robot, self._sent)
-        self._shape = views.frame_origins(arm.robot, self._sent)
-
-    def _stop(self) -> None:
-        self._target = None
-        self.change(swing=False)
+    def _on_side(self, item: Redundancy) -> Redundancy:
+        return on_side_of(self.settings.side, item, self.stage.units.angles)
 
     def _range(self) -> tuple[float, float] | None:
-        found = None if self._item is None else range_of(self._item)
+        found = None if self.facts.item is None else range_of(self.facts.item)
         if found is None or found[1] - found[0] < 4.0 * INSET:
             return None
         return found[0] + INSET, found[1] - INSET
 
-    @property
-    def _ends(self) -> tuple[End, ...]:
-        return () if self._ring is None else self._ring.ends
-
-    def _bounded(self, requested: float) -> float | None:
-        """The feasible value nearest to the requested one; if they differ, the notice on arrival says so."""
-        self._arrival = MOVING
-        found = self._range()
-        if found is None:
-            return None
+    def _approach(self, requested: float) -> None:
+        """Go to the feasible value nearest to the requested one; if they differ, the notice on arrival says so."""
+        if (found := self._range()) is None:
+            return
         low, high = found
-        turn = 2.0 * math.pi
-        periodic = high > math.pi or low < -math.pi
-        images = [requested + k * turn for k in (-1, 0, 1)] if periodic else [requested]
+        images = [requested + k * TURN for k in (-1, 0, 1)] if high > math.pi or low < -math.pi else [requested]
         nearest = min((min(max(x, low), high) for x in images), key=lambda v: min(abs(v - x) for x in images))
+        arrival = MOVING
         if min(abs(nearest - x) for x in images) > 1e-3:
-            end = next((e for e in self._ends if abs(e.value - nearest) < 1e-3), None)
+            ring = self.facts.ring
+            end = next((e for e in ring.ends if abs(e.value - nearest) < 1e-3), None) if ring else None
             reason = (
                 "The posture ends here"
                 if end is None or end.joint < 0
                 else f"Joint {end.joint + 1} is at its limit"
             )
-            self._arrival = Notice("limits", "End of the range", f"{reason}: no self-motion leads further.")
-        return nearest
+            arrival = Notice("limits", "End of the range", f"{reason}: no self-motion leads further.")
+        self.change(target=nearest, arrival=arrival)
 
     def _step(self, seconds: float) -> None:
         """Move towards the target value, as far as the speed allows."""
-        item, found = self._item, self._range()
-        if item is None or found is None:
-            self._stop()
-            self.schedule()
+        f, s, item, found = self.facts, self.settings, self.facts.item, self._range()
+        if item is None or found is None or (s.held is not None and not f.is_held):
+            self.change(swing=False, target=None)
             return
         low, high = found
         value, whole = item.value, False
-        if self.settings.swing:
-            whole = high - low >= 2.0 * math.pi - 4.0 * INSET
+        if s.target is None:
+            whole = high - low >= TURN - 4.0 * INSET
             value = min(max(value, low), high)
             if not whole and value >= high - NEAR:
-                self._up = False
+                self.change(up=False)
             elif not whole and value <= low + NEAR:
-                self._up = True
-            goal = math.inf if self._up else -math.inf
-        else:
-            assert self._target is not None
-            goal = self._target
+                self.change(up=True)
+            goal = math.inf if self.settings.up else -math.inf
+        else:  # the range may be given a turn further on since the target was set
+            images = [s.target + k * TURN for k in (0, -1, 1)] if circular(item) else [s.target]
+            goal = min(images, key=lambda x: max(low - x, x - high, 0.0))
         step = SPEED * seconds
         after = value + min(max(goal - value, -step), step)
-        if not whole:
-            after = min(max(after, low), high)
-        self._move(item, after)
+        self._move(item, after if whole else min(max(after, low), high), goal)
 
-    def _move(self, item: Redundancy, value: float) -> None:
+    def _move(self, item: Redundancy, value: float, goal: float) -> None:
         """Move the arm to a value of the parameter, unless a joint would jump."""
-        stage, numeric = self.stage, self.read.numeric
-        q = self._led(item, value) if numeric else self._solved(item, value)
-        if q is None or float(np.abs(q - self._sent).max()) > SMOOTH:
-            if numeric and self._target is not None:
-                stage.notify(BLOCKED)
-            self._up, self._target = not self._up, None
-            self.schedule()
+        f, s = self.facts, self.settings
+        q = self._led(item, value) if f.numeric else self._solved(item, value)
+        if q is None or float(np.abs(q - f.held.q).max()) > SMOOTH:
+            if f.numeric and s.target is not None:
+                self.stage.notify(BLOCKED)
+            self.change(up=not s.up, target=None)
             return
-        self._sent = q
-        if numeric:
+        if f.numeric:
             value = float(q[int(item.name.removeprefix("theta")) - 1])
-        self._item = item._replace(value=value)
-        notice = MOVING
-        if self._target is not None and abs(self._target - value) < NEAR:
-            self._target, notice = None, self._arrival
-        stage.move_to(self._sent, notice, at_once=True)
+        arrived = abs(goal - value) < NEAR
+        notice = s.arrival if arrived else MOVING
+        self.change(held=replace(f.held, q=q), target=None if arrived else s.target, side=value)
+        self.stage.move_to(q, notice, at_once=True)
 
     def _solved(self, item: Redundancy, value: float) -> Array | None:
         """The configuration for a value of an exact parameter."""
-        arm = self.stage.now
-        result = self_motion(arm.robot, self._T_held, arm.options, self._sent, item.name, value)
+        arm, held = self.stage.now, self.facts.held
+        result = self_motion(arm.robot, held.T, arm.options, held.q, item.name, value)
         return np.array(result.solutions[0].q) if result.solutions else None
 
     def _led(self, item: Redundancy, value: float) -> Array | None:
         """The configuration near the present one in which a joint of the null space has a value."""
-        arm, locked = self.stage.now, self.read.locked
+        arm, held, locked = self.stage.now, self.facts.held, self.facts.locked
         joint = int(item.name.removeprefix("theta")) - 1
-        near = within(arm.robot, self._sent, arm.task, joint, value, locked)
-        return lead(arm.robot, self._sent, self._T_held, arm.task, joint, near, locked)
+        near = within(arm.robot, held.q, arm.task, joint, value, locked)
+        return lead(arm.robot, held.q, held.T, arm.task, joint, near, locked)

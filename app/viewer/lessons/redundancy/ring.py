@@ -14,8 +14,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from app.viewer.self_motion import End
 from kin import Robot, fk, link_frames
 from kin.axes import inverse
+from kin.ik import Redundancy
 from kin.solvers import closed_form_of, srs7
 from kin.solvers.reversed import ReversedJoints
 from kin.transforms import Array, frame_from_approach
@@ -38,6 +40,23 @@ class Circle:
     def at(self, psi: float, scale: float = 1.0) -> Array:
         """The elbow ``(3,)`` at an arm angle; `scale` widens the circle."""
         return self.center + scale * self.radius * (math.cos(psi) * self.e1 + math.sin(psi) * self.e2)
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """What the ring is about; it changes with the target, not during a self-motion.
+
+    Attributes:
+        goal, T_held: where the arm was heading ``(n,)``, and where the tool is held ``(4, 4)``.
+        item: the parameter whose values are drawn; None: there is nothing to draw.
+        ends: of its ranges.
+    """
+
+    robot: Robot
+    goal: Array
+    T_held: Array
+    item: Redundancy | None
+    ends: tuple[End, ...]
 
 
 def elbow_circle(robot: Robot, q: Array) -> Circle | None:

@@ -6,7 +6,6 @@ quaternion or a matrix, or taken from the tool.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
@@ -16,6 +15,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Sweep
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.rotations import views
@@ -55,13 +55,11 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         return "pose"
 
     def started(self) -> None:
-        self._error = ""
-        self._turning: Turning | None = None
         self._figure = FigureNodes(body(self.stage.now.robot).size)
         self.stage.fit_view([room(self.stage.now.robot)])
 
     def restore(self, state: dict[str, object]) -> None:
-        self._turning = None
+        self.change(turning=None)
         super().restore(state)
 
     def remove(self) -> None:
@@ -74,7 +72,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         f, s, units = self.read, self.settings, self.stage.units
         uses = {"Set": self.on_set, "From tool": self.on_from_tool, "To target": self.on_to_target}
         turned = {name: self.event(self.on_turn, *which) for name, which in TURNS.items()}
-        at = None if self._turning is None else self._turning.turn(time.perf_counter())
+        at = None if s.turning is None else s.turning.turn
         changes = {"Add": self.on_add, "Remove": self.on_remove, "Swap": self.on_swap, "Clear": self.on_clear}
         turns = MOTIONS[s.motion][0]
         return [
@@ -93,7 +91,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
                     Html(views.rotation_html, (f.convention, s.angles, units)),
                     Control("typed"),
                     Buttons("Use", {name: self.event(method) for name, method in uses.items()}, ACT_HINT),
-                    Html(views.error_html, (self._error,)),
+                    Html(views.error_html, (s.error,)),
                 ),
                 visible=not s.chained,
             ),
@@ -117,8 +115,8 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
 
     def scene(self) -> Sequence[Lazy]:
         shown = self.settings
-        if self._turning is not None:
-            shown = replace(shown, angles=self._turning.angles(shown.angles, time.perf_counter()))
+        if shown.turning is not None:
+            shown = replace(shown, angles=shown.turning.angles(shown.angles))
         return [Lazy("frames", self._frames, (shown,))]
 
     def _frames(self, shown: RotationsSettings) -> list[SceneNode]:
@@ -127,7 +125,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
     # Events
 
     def changed(self, path: str) -> None:
-        self._turning = None
+        self.change(turning=None)
         if path == "convention":  # the same rotation in another convention
             self._turn_to(self.facts.R)
             self.on_turn(0, 2)
@@ -136,34 +134,32 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         """Show how these turns of the convention turn the frame, unless they are asked for; nothing changes."""
         if self.hides("forms") or self.settings.chained:
             return
-        self._turning = Turning(first, last, time.perf_counter())
+        self.change(turning=Turning(first, last))
 
-    def advance(self, now: float) -> float | None:
-        if self._turning is None:
-            return None
-        if self._turning.turn(now) > self._turning.last:
-            self._turning = None
-            self.schedule()
-            return None
-        self.draw()
-        return FRAME
+    def running(self) -> Sequence[Sweep]:
+        return [] if self.settings.turning is None else [Sweep(self._turn, FRAME)]
+
+    def _turn(self, seconds: float) -> None:
+        assert self.settings.turning is not None
+        after = replace(self.settings.turning, passed=self.settings.turning.passed + seconds)
+        self.change(turning=None if after.turn > after.last else after)
 
     def on_from_tool(self) -> None:
-        self._error = ""
+        self.change(error="")
         self._turn_to(self.stage.now.T_goal[:3, :3])
 
     def on_to_target(self) -> None:
-        self._error = ""
+        self.change(error="")
         T = self.stage.now.aim.copy()
         T[:3, :3] = self.facts.R
         self.stage.set_target(T)
 
     def on_set(self) -> None:
-        self._error = ""
+        self.change(error="")
         try:
             self._turn_to(read_rotation(self.settings.typed, self.facts.convention, self.stage.units))
         except EntryError as error:
-            self._error = f"{error.title}: {error.detail}"
+            self.change(error=f"{error.title}: {error.detail}")
 
     def on_add(self) -> None:
         s = self.settings

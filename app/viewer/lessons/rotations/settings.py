@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from app.viewer.declared.fields import Number, Settings, choice, kept, number, text, vector
+from app.viewer.declared.fields import Number, Settings, choice, kept, memory, number, text, vector
 from app.viewer.lessons.rotations.conventions import CONVENTIONS, PAGE, Angles
 from app.viewer.lessons.rotations.frames import FARTHEST, Motion, as_json, from_json
+from app.viewer.lessons.rotations.turning import Turning
 from app.viewer.lessons.rotations.typed import LONGEST
 from kin import Robot
 
@@ -44,7 +45,12 @@ def _chain(entry: object, robot: Robot) -> tuple[Motion, ...]:
 
 @dataclass(frozen=True)
 class RotationsSettings(Settings):
-    """See the module; `turn` and `shift` are amounts of the next motion (rad, m)."""
+    """See the module; `turn` and `shift` are amounts of the next motion (rad, m).
+
+    Attributes:
+        error: what is wrong with the typed rotation.
+        turning: the turns that are shown one after another.
+    """
 
     convention: str = choice("Angles", {c.title: c.key for c in CONVENTIONS}, PAGE.key, hint=CONVENTION_HINT)
     angles: Angles = vector(("α", "β", "γ"), FIRST, ANGLE)
@@ -56,3 +62,5 @@ class RotationsSettings(Settings):
     turn: float = number("Angle", math.radians(90.0), (-MOST_TURN, MOST_TURN), "angle", hint=TURN_HINT)
     shift: float = number("Length", 0.2, (-FARTHEST, FARTHEST), "length", hint=SHIFT_HINT)
     typed: str = text("Rotation", hint=TYPED_HINT, longest=LONGEST, link=False)
+    error: str = memory("")
+    turning: Turning | None = memory()

@@ -12,26 +12,26 @@ FRAME = 1 / 30  # s between two frames
 
 @dataclass(frozen=True)
 class Turning:
-    """Some of the turns, shown from a moment on. Time is `time.perf_counter`'s.
+    """Some of the turns, and for how long they have been shown.
 
     Attributes:
         first, last: indices of the turns.
-        begun: when it began.
+        passed: seconds since it began.
     """
 
     first: int
     last: int
-    begun: float
+    passed: float = 0.0
 
-    def turn(self, now: float) -> int:
+    @property
+    def turn(self) -> int:
         """The index of the turn that is shown; `last` + 1 when all are over."""
-        return min(self.first + int(max(now - self.begun, 0.0) // (TIME + REST)), self.last + 1)
+        return min(self.first + int(self.passed // (TIME + REST)), self.last + 1)
 
-    def angles(self, angles: Angles, now: float) -> Angles:
+    def angles(self, angles: Angles) -> Angles:
         """The angles of the convention as far as the turns have come; those that come later are zero."""
-        at = self.turn(now)
-        passed = max(now - self.begun, 0.0) - (at - self.first) * (TIME + REST)
-        share = min(passed / TIME, 1.0)
+        at = self.turn
+        share = min((self.passed - (at - self.first) * (TIME + REST)) / TIME, 1.0)
         share = share * share * (3.0 - 2.0 * share)
         found = [angle if k < at else share * angle if k == at else 0.0 for k, angle in enumerate(angles)]
         return found[0], found[1], found[2]

@@ -37,7 +37,7 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
     def started(self) -> None:
         self._figure = FigureNodes(body(self.stage.now.robot).size)
         self.stage.see_through(True)
-        center, radius = round_points(tips(self.compute_facts()))
+        center, radius = round_points(tips(self.facts))
         self.stage.fit_view([(center, LABELS * radius)])
 
     def remove(self) -> None:

@@ -14,12 +14,13 @@ import numpy as np
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Sweep, Work
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.velocity import section_views, views
 from app.viewer.lessons.velocity.drawing import force_scale, lost_ends, scene, truncated
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.jog import BUTTONS, button, step
-from app.viewer.lessons.velocity.null_motion import FRAME, NullMotion
+from app.viewer.lessons.velocity.null_motion import FRAME, MOVING, after
 from app.viewer.lessons.velocity.questions import outline
 from app.viewer.lessons.velocity.settings import FIRST, LARGEST, VelocitySettings
 from kin.transforms import Array
@@ -39,20 +40,6 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     outline = staticmethod(outline)
     settings_of, facts_of = VelocitySettings, VelocityFacts
     undo: ClassVar[dict[str, str]] = {"on_jog": "Jog"}
-
-    def started(self) -> None:
-        self._refused: tuple[object, ...] = ()
-        self._start: Array | None = None
-        self._plot = ""
-        self._motion: NullMotion | None = None
-        self._lost = np.zeros((0, 3))  # the ends of the arrows of lost directions
-
-    def refresh(self) -> None:
-        super().refresh()
-        found = np.zeros((0, 3)) if self.hides("singularities") else lost_ends(self.read)
-        if len(found) != len(self._lost) or not np.allclose(found, self._lost):
-            self._lost = found
-            self.stage.keep_in_view(None, found)
 
     # What is shown
 
@@ -93,7 +80,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             Folder("Along a line", [
                 Button("Start here", self.event(self.on_line_start), section_views.START_HINT),
                 Button("Plot the line", self.event(self.on_line_plot), section_views.PLOT_HINT),
-                Html(str, (self._plot,)),
+                Html(str, (s.plot,)),
             ], open=False),
         ]  # fmt: skip
 
@@ -139,7 +126,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         if path.startswith("statics.force"):
             self._push(self.settings.statics.force)
         elif path == "runs":
-            self._motion = None
+            self.change(motion=None)
 
     def on_column(self, joint: int) -> None:
         self.change(joint=None if joint == self.settings.joint else joint)
@@ -148,11 +135,11 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         stage, arm, s = self.stage, self.stage.now, self.settings
         amount = sign * (s.step if axis < 3 else s.turn)
         request = (arm.robot, arm.goal.tobytes(), arm.options, axis, amount, s.frame, stage.units)
-        if request == self._refused:
-            return  # a button held at a limit: the same request would be solved ten times a second
+        if request == s.refused:
+            return
         made = step(arm.robot, arm.goal, arm.options, axis, amount, s.frame, stage.units)
         if made.q is None:
-            self._refused = request
+            self.change(refused=request)
             stage.notify(made.notice)
         else:
             stage.move_to(made.q, made.notice)
@@ -166,22 +153,36 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             self._push([x / force_scale(self.stage.now.robot) for x in place])
 
     def on_line_start(self) -> None:
-        self._start, self._plot = self.stage.now.goal.copy(), section_views.note_html(section_views.HERE)
+        self.change(start=self.stage.now.goal, plot=section_views.note_html(section_views.HERE))
 
     def on_line_plot(self) -> None:
-        self._plot = section_views.plot_html(self.stage.now, self._start, self.stage.units)
+        self.change(plot=section_views.plot_html(self.stage.now, self.settings.start, self.stage.units))
 
-    def advance(self, now: float) -> float | None:
-        if not self.settings.runs:
-            return None
-        if self._motion is None:
-            self._motion = NullMotion(self.stage, now)
-        elif not self._motion.step(self.facts, now):
-            self._motion = None
-            self.change(runs=False)
-            self.refresh()
-            return None
-        return FRAME
+    def running(self) -> Sequence[Work | Sweep]:
+        found: list[Work | Sweep] = [Sweep(self._move, FRAME)] if self.settings.runs else []
+        lost = np.zeros((0, 3)) if self.hides("singularities") else lost_ends(self.read)
+        return [*found, Work("in view", self._keep_in_view, (lost.round(6),), keep=True)]
+
+    def _keep_in_view(self, ends: Array) -> Array:
+        """Let the picture contain the arrows of lost directions, and the arm alone when they are gone."""
+        before = self.facts.work("in view").value
+        if len(ends) or (before is not None and len(before)):
+            self.stage.keep_in_view(None, ends)
+        return ends
+
+    def _move(self, seconds: float) -> None:
+        """A frame of the motion in the null space; another motion of the arm ends it."""
+        arm, motion = self.stage.now, self.settings.motion
+        if motion is None:
+            motion = arm.goal, arm.T_goal
+        made = after(*motion, self.facts, seconds) if np.array_equal(motion[0], arm.goal) else None
+        if isinstance(made, tuple):
+            self.change(motion=made)
+            self.stage.move_to(made[0], MOVING, at_once=True)
+            return
+        self.change(runs=False, motion=None)
+        if made is not None:
+            self.stage.notify(made)
 
     def _push(self, force: Sequence[float]) -> None:
         """Show this force, within the limits."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.viewer.declared.fields import Number, Settings, choice, flag, joint, number, part, vector
+from app.viewer.declared.fields import Number, Settings, choice, flag, joint, memory, number, part, vector
 from app.viewer.lessons.velocity.ellipsoids import Ellipsoid
 from app.viewer.lessons.velocity.jog import Frame
 from kin.differential.null_space import Goal
@@ -54,7 +54,14 @@ class Statics(Settings):
 
 @dataclass(frozen=True)
 class VelocitySettings(Settings):
-    """See the module; `joint` is that of the column on show."""
+    """See the module; `joint` is that of the column on show.
+
+    Attributes:
+        refused: the jog that was refused last: a button held at a limit asks ten times a second.
+        start: the configuration ``(n,)`` where the line begins; None: home.
+        plot: the plot of the line, as HTML.
+        motion: where the motion in the null space has come to: configuration ``(n,)`` and pose ``(4, 4)``.
+    """
 
     frame: Frame = choice("Frame", FRAMES, "base", hint=FRAME_HINT)
     ellipsoid: Ellipsoid | None = choice("Show", ELLIPSOIDS, "velocity", none="none", hint=ELLIPSOID_HINT)
@@ -65,3 +72,7 @@ class VelocitySettings(Settings):
     goal: Goal = choice("Secondary goal", GOALS, "limits", hint=GOAL_HINT, link=False)
     speed: str = choice("Tool velocity", {name: name for name in SPEEDS}, "At rest", hint=SPEED_HINT, link=False)
     runs: bool = flag("Run", hint=RUN_HINT, link=False, renew=True)
+    refused: tuple[object, ...] = memory(())
+    start: Array | None = memory()
+    plot: str = memory("")
+    motion: tuple[Array, Array] | None = memory()

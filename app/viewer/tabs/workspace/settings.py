@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.viewer.declared.fields import Settings, choice, flag, number, slider
+from app.viewer.declared.fields import Settings, choice, flag, memory, number, slider
 from app.viewer.tabs.workspace.colours import BY, MAPS, By
-from app.viewer.tabs.workspace.cut import AXES, KEEP, Axis, Keep
+from app.viewer.tabs.workspace.cut import AXES, KEEP, Axis, Cut, Keep
 from kin import Robot
 from kin.units import grouped
 from kin.workspace import Strategy
@@ -59,6 +59,11 @@ class WorkspaceSettings(Settings):
         compare: id of the other robot, None for none. Which there are follows from the service.
         sizes, section, axes: whether the sizes, the section plot and axes with numbers are shown.
         clicks: whether a click moves the arm to a point.
+        cut: along `axis`.
+        opens, opened: whether a new map is cut open (until the visitor chooses a cut), and whether the present
+            cut was made so.
+        in_view: what the default view was fitted to: the number of clouds, whether there is a map, and the arm
+            whose axes are shown.
     """
 
     n: int = number("Points", 100_000, (1, MAX_POINTS), whole=True, names="points", hint=POINTS_HINT)
@@ -88,3 +93,7 @@ class WorkspaceSettings(Settings):
     section: bool = flag("Section plot", hint=SECTION_HINT)
     axes: bool = flag("Axes with numbers", hint=AXES_HINT)
     clicks: bool = flag("Click on a point", True, hint=CLICKS_HINT)
+    cut: Cut | None = memory()
+    opens: bool = memory(True, renew=False)
+    opened: bool = memory(False)
+    in_view: tuple[int, bool, Robot | None] = memory((0, False, None), renew=False)

@@ -22,7 +22,7 @@ from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
-from app.viewer.tabs.workspace.cut import Axis, Cut, cut_of
+from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import PointPicker
 from app.viewer.tabs.workspace.said import Said
@@ -52,15 +52,10 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def __init__(self, stage: Stage) -> None:
         self._said = Said()
-        self._parts = False  # whether they are there
         super().__init__(stage)
 
-    def started(self) -> None:
-        if not self._parts:
-            self._build(self.stage)
-
-    def _build(self, stage: Stage) -> None:
-        self._parts = True
+    def built(self) -> None:
+        stage = self.stage
         window = SendWindow(stage.client, lambda: self.post("more"))
         self._roots = 0
         self._clouds = CloudView(
@@ -70,22 +65,17 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._sizes = Sizes(stage, self._said, self.post)
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene, self._new_root)
-        self._cut: Cut | None = None
-        # Whether a new map is cut open (until the visitor chooses a cut), and whether the present cut was made so.
-        self._opens, self._opened = True, False
         self._plotted = self._dotted = self._moved = 0.0
         self._tool = stage.now.T_tool[:3, 3]
         self._dot_due = False
-        # Number of clouds, whether there is a map, and the arm whose axes are shown.
-        self._in_view: tuple[int, bool, Robot | None] = (0, False, None)
         self._capability = Capability(
             stage,
             window,
             self._post_capability,
             self._new_root,
-            self.settings.map,
             self._open_map,
         )
+        self._capability.use_look(self.settings.map, None, None)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
             "more": lambda _: None,
@@ -119,7 +109,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         return [
             *nodes,
             *cloud(s, self._said, actions),
-            *form(s, self._said, robot, others, self._cut, unit),
+            *form(s, self._said, robot, others, s.cut, unit),
         ]
 
     # Events
@@ -142,7 +132,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         robot = self.stage.now.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._use(self.settings.for_robot(robot))
-        self._opened = False
         self._set_cut()
         if self._section is not None:
             self._show_section(False)
@@ -185,13 +174,13 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._update_section(now)
         try:
             self._capability.poll(now, moving)
-            if self._opened and self._capability.empty:
+            if self.settings.opened and self._capability.empty:
                 self._cut_as(None)
             self._fit_view()
         finally:
             self.refresh()
             cloud_due = DOT if self._dot_due else self._clouds.next_tick(now, moving)
-            times = [due for due in (cloud_due, self._capability.wait) if due is not None]
+            times = [due for due in (cloud_due, self._capability.due) if due is not None]
             self.due = min(times, default=None)
 
     def state(self) -> dict[str, object]:
@@ -200,8 +189,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def restore(self, state: dict[str, object]) -> None:
         before, robot = self.settings, self.stage.now.robot
-        self._use(before.restored(state, robot))
-        self._opened = False
+        self._use(replace(before.restored(state, robot), opened=False))
         if self.settings.compare not in (None, *(r.id for r in self.stage.store.robots if r != robot)):
             self._use(replace(self.settings, compare=before.compare))  # the robot is gone
         at = self.settings.at
@@ -209,7 +197,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._clouds.resize()
         self._clouds.compare()
         self._set_cut()
-        if self._cut is not None:
+        if self.settings.cut is not None:
             self._use(replace(self.settings, at=at))
             self._show_slabs()
         self._clouds.recolour()
@@ -222,12 +210,12 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             self._start()
         if isinstance(saved := state.get("capability"), dict):
             self._capability.restore(saved)
-        self._write = True
+        self.rewrite()
         self.refresh()
         self.due = 0.0
 
     def on_leave(self) -> None:
-        self._capability.leave()
+        self._capability.on_leave()
         self._sizes.leave()
         if self._section is not None:
             self._section.leave()
@@ -259,7 +247,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             case "size":
                 self._clouds.resize()
             case "axis":
-                self._opens = self._opened = False
+                self._use(replace(self.settings, opens=False, opened=False))
                 self._set_cut()
             case "at" | "keep":
                 self._show_slabs()
@@ -352,8 +340,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         clouds, mapped = self._clouds.extents, self._capability.extent
         corners = self._axes.corners
         in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.now.robot)
-        if in_view != self._in_view:
-            self._in_view = in_view
+        if in_view != self.settings.in_view:
+            self._use(replace(self.settings, in_view=in_view))
             self.stage.fit_view(clouds if mapped is None else [*clouds, mapped], corners)
 
     def extents(self) -> Sequence[Sphere]:
@@ -365,36 +353,35 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def _open_map(self, found: CapabilityMap) -> None:
         """Cut a new map, a solid, open along the arm, so that its inside is seen; a flat one has none."""
-        if self._opens and self.settings.axis is None and min(found.grid.shape) > 1:
+        if self.settings.opens and self.settings.axis is None and min(found.grid.shape) > 1:
             self._cut_as("arm")
 
     def _cut_as(self, axis: Axis | None) -> None:
         """Cut without being asked, and keep the side that is farther from the camera; None: no longer."""
-        self.change(axis=axis)
-        self._use(self.settings)
+        self._use(replace(self.settings, axis=axis, opened=axis is not None))
         self._set_cut()
-        self._opened = axis is not None
-        if self._cut is not None:
-            seen = float(np.array(self._cut.normal) @ self.stage.toward_camera())
-            self.change(keep="below" if seen >= 0.0 else "above")
-            self._use(self.settings)
+        if (cut := self.settings.cut) is not None:
+            seen = float(np.array(cut.normal) @ self.stage.toward_camera())
+            self._use(replace(self.settings, keep="below" if seen >= 0.0 else "above"))
             self._show_slabs()
 
     def _set_cut(self) -> None:
         """Cut along the axis in the settings, near the middle, or not at all."""
-        self._cut = None
+        cut = None
         if self.settings.axis is not None:
             robots = [self.stage.now.robot, *([self._clouds.other] if self._clouds.other is not None else [])]
-            self._cut = cut_of(robots, self.settings.axis, self.stage.now.q)
-            self._use(replace(self.settings, at=self._cut.middle))
-        self._clouds.set_cut(self._cut, None)
+            cut = cut_of(robots, self.settings.axis, self.stage.now.q)
+            self._use(replace(self.settings, at=cut.middle))
+        self._use(replace(self.settings, cut=cut))
+        self._clouds.set_cut(cut, None)
         self._show_slabs()
 
     def _show_slabs(self) -> None:
         """Show the slabs on the visible side of the cut."""
-        slabs = None if self._cut is None else self._cut.shown(self.settings.at, self.settings.keep)
+        s = self.settings
+        slabs = None if s.cut is None else s.cut.shown(s.at, s.keep)
         self._clouds.show(slabs)
-        self._capability.use_look(self.settings.map, self._cut, slabs)
+        self._capability.use_look(s.map, s.cut, slabs)
 
     # Section
 

@@ -10,9 +10,9 @@ from typing import ClassVar
 import kin
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
-from app.viewer.declared.fields import Settings, choice, number, text
+from app.viewer.declared.fields import Settings, choice, memory, number, text
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
-from app.viewer.feature import Stage
+from app.viewer.declared.work import Sweep
 from app.viewer.own_arm import clean
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits
@@ -39,7 +39,12 @@ def _listed(robot: Robot) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class MotorSettings(Settings):
-    """What is typed: the motors themselves are the arm's, and in its link."""
+    """What is typed: the motors themselves are the arm's, and in its link.
+
+    Attributes:
+        run: of *Match motors*.
+        streams: whether a connected program sends readings for it.
+    """
 
     chosen: int = choice("Motor", _listed, 0, link=False, renew=False)
     id: int = number("Number on the bus", 1, (0, LARGEST_ID), whole=True, link=False)
@@ -51,13 +56,13 @@ class MotorSettings(Settings):
     calibration: str = text(
         "LeRobot's calibration", hint="The text of its JSON file, pasted", longest=100_000, link=False
     )
+    run: Run | None = memory(renew=False)
+    streams: bool = memory(False)
 
 
 @dataclass(frozen=True, eq=False)
 class MotorFacts(Facts[MotorSettings]):
     """The arm, and the run of *Match motors*."""
-
-    run: Run | None = None
 
     @property
     def motor(self) -> Motor | None:
@@ -75,31 +80,32 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
     messages = frozenset({"upload"})
     undo: ClassVar[dict[str, str]] = {"on_use": "Motors matched", "on_add": "Motors", "on_remove": "Motors"}
 
-    def __init__(self, stage: Stage) -> None:
-        self._run: Run | None = None
-        super().__init__(stage)
-
     def started(self) -> None:
-        if self._run is not None and not self._run.of(self.stage.now.robot):
-            self._run = None
+        run = self.settings.run
+        if run is not None and not run.of(self.stage.now.robot):
+            self.change(run=None)
 
-    def extra_dependencies(self) -> tuple[object, ...]:
-        return self._run, self._streamed() is not None
+    def running(self) -> Sequence[Sweep]:
+        return [] if self.settings.run is None else [Sweep(self._look, LOOK_AGAIN)]
 
-    def advance(self, now: float) -> float | None:
-        """During a run, look now and then whether a program sends readings."""
-        return LOOK_AGAIN if self._run is not None else None
+    def _look(self, seconds: float) -> None:
+        """Look whether a program sends readings."""
+        if (streams := self._streamed() is not None) != self.settings.streams:
+            self.change(streams=streams)
 
     def _streamed(self) -> tuple[float, ...] | None:
         """The readings of the motors that a connected program sends, if there are as many as the run has."""
-        line = self.stage.door.line
-        if self._run is None or line is None or line.readings is None:
+        run, line = self.settings.run, self.stage.door.line
+        if run is None or line is None or line.readings is None:
             return None
         found = tuple(line.readings)
-        return found if len(found) == len(moving_motors(self._run.robot)) else None
+        return found if len(found) == len(moving_motors(run.robot)) else None
 
-    def compute_facts(self) -> MotorFacts:
-        return MotorFacts(self.settings, self.stage.now, self._run)
+    @property
+    def _run(self) -> Run:
+        """The run that its controls are about."""
+        assert self.settings.run is not None
+        return self.settings.run
 
     # What is shown
 
@@ -108,8 +114,8 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def _nodes(self) -> list[Node]:
         f, robot = self.read, self.read.robot
-        if f.run is not None:
-            return self._run_nodes(f.run)
+        if f.settings.run is not None:
+            return self._run_nodes(f.settings.run)
         add = Button(
             "Add motors", self.event(self.on_add), "One of each joint, in degrees, with the numbers 1, 2, …"
         )
@@ -148,7 +154,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             "Find from two": self.event(self.on_solve),
             "Stop": self.event(self.on_stop),
         }
-        absent = {"Back": run.at == 0, "Find from two": not two, "Read program": self._streamed() is None}
+        absent = {"Back": run.at == 0, "Find from two": not two, "Read program": not self.settings.streams}
         offered = tuple(name for name in acts if not absent.get(name))
         return [
             Html(views.pose, (run, self.stage.units), key="pose"),
@@ -183,14 +189,15 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             self.stage.notify(Notice("error", "The file was not used", str(error)))
 
     def changed(self, path: str) -> None:
-        motor = self.compute_facts().motor
+        self.invalidate()
+        motor = self.facts.motor
         if path == "calibration" and self.settings.calibration.strip():
             typed = self.settings.calibration
             self.change(calibration="")
-            self._write = True
+            self.rewrite()
             self._use(kin.motors.motors_from_lerobot(self.stage.now.robot, typed), "The calibration is used")
         elif path in FIELDS and motor is not None:
-            self._write = True  # a field whose text was refused shows what counts
+            self.rewrite()  # a field whose text was refused shows what counts
             changed = replace(motor, **{path: getattr(self.settings, path)})
             if changed != motor:
                 self._use([changed if each.id == motor.id else each for each in self.stage.now.robot.motors])
@@ -212,19 +219,17 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def on_match(self) -> None:
         """Show the first pose."""
-        self._run = begun(self.stage.now.robot, self.stage.now.obstacles)
-        self.stage.fit_view((), self._run.points)
-        self._show_pose()
+        run = begun(self.stage.now.robot, self.stage.now.obstacles)
+        self.stage.fit_view((), run.points)
+        self._show_pose(run)
 
     def on_next(self) -> None:
         """Take the readings of this pose, and show the next one, or what they say after the last."""
-        assert self._run is not None
         run = self._run.read(readings_of(self.settings.readings, self._run.robot))
         if run.is_last:
-            self._run = run.solved()
+            self.change(run=run.solved())
         else:
-            self._run = run.to(run.at + 1)
-            self._show_pose()
+            self._show_pose(run.to(run.at + 1))
 
     def on_read(self) -> None:
         """Take the newest readings of a connected program."""
@@ -233,18 +238,14 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def on_solve(self) -> None:
         """Find signs and zeros from the poses that are read."""
-        assert self._run is not None
-        self._run = self._run.solved()
+        self.change(run=self._run.solved())
 
     def on_to(self, at: int) -> None:
         """Show another pose."""
-        assert self._run is not None
-        self._run = self._run.to(at)
-        self._show_pose()
+        self._show_pose(self._run.to(at))
 
     def on_use(self) -> None:
         """Write what has been found into the arm."""
-        assert self._run is not None
         assert self._run.match is not None
         motors = self._run.match.motors
         self.on_stop()
@@ -252,7 +253,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def on_stop(self) -> None:
         """End the run."""
-        self._run = None
+        self.change(run=None)
         self.stage.fit_view(())
 
     def on_save(self) -> None:
@@ -261,10 +262,9 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         self.stage.client.send_file_download("calibration.json", data.encode(), save_immediately=True)
         self.stage.notify(Notice("hand", "calibration.json is saved", SAVED))
 
-    def _show_pose(self) -> None:
+    def _show_pose(self, run: Run) -> None:
         """Move the arm to the pose of the run; what was read in it before is in the field."""
-        assert self._run is not None
-        run = self._run
+        self.change(run=run)
         self._write_readings(run.readings[run.at])
         words = "Put your arm as this one, then type what its motors read. Tab Robot."
         self.stage.move_to(run.poses[run.at], Notice("hand", f"Pose {run.at + 1} of {COUNT}", words))
@@ -272,7 +272,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
     def _write_readings(self, values: Sequence[float] | None) -> None:
         """Write readings into the field."""
         self.change(readings=" ".join(f"{value:.10g}" for value in values or ()))
-        self._write = True
+        self.rewrite()
 
     def _use(self, motors: Sequence[Motor], done: str = "") -> None:
         """The arm with these motors becomes the visitor's own; raises `InputError`."""

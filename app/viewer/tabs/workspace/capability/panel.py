@@ -7,23 +7,22 @@ folder polls it a few times a second and redraws it if it has changed. The visit
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.shared.computations import Subscription
 from app.shared.maps import MapRequest, MapTimeError
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
-from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node, Progress
+from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node, Progress, same
+from app.viewer.declared.work import Result, Work
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
 from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.capability import views
-from app.viewer.tabs.workspace.capability.settings import MapSettings
-from app.viewer.tabs.workspace.capability.voxels import Look, Voxels, mark
+from app.viewer.tabs.workspace.capability.settings import Look, MapSettings
+from app.viewer.tabs.workspace.capability.voxels import Voxels, mark
 from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.views.templates import render
@@ -40,20 +39,53 @@ ABOUT = (
 MAP_HINT = "Start: compute the map. Stop: keep the part computed so far. Clear: remove the map."
 
 
-class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
+class MapFacts(Facts[MapSettings]):
+    """The map, as far as it is computed."""
+
+    @property
+    def map(self) -> Result:
+        """What computing it has come to."""
+        return self.settings.stopped or self.work("map")
+
+    @property
+    def found(self) -> CapabilityMap | None:
+        """The map, or its part."""
+        found: CapabilityMap | None = self.map.value
+        return found
+
+    @property
+    def state(self) -> views.State:
+        """How far it is."""
+        if self.settings.request is None:
+            return "ready"
+        if self.settings.stopped is not None:
+            return "stopped"
+        if self.map.error is not None:
+            return "out of time" if isinstance(self.map.error, MapTimeError) else "failed"
+        if self.map.finished:
+            return "done"
+        return "computing" if self.map.total else "waiting"
+
+    @property
+    def requested(self) -> MapRequest:
+        """The map that settings and locks describe."""
+        s = self.settings
+        return MapRequest(self.robot, s.resolution, s.directions, self.arm.options.constraints)
+
+
+class Capability(DeclaredFeature[MapSettings, MapFacts]):
     """The folder and its map. Builds its controls in whatever container is open.
 
     Args:
         window: flow control, shared with the clouds.
         post: returns the events of controls and clicks to `handle`.
         new_root: returns a prefix of node names that was never used before.
-        colours: name of the colour map.
         appears: called with the first voxels of a map that the visitor has started, before they are drawn.
     """
 
     key = "capability"
     title = "Workspace"
-    settings_of, facts_of = MapSettings, Facts
+    settings_of, facts_of = MapSettings, MapFacts
 
     def __init__(
         self,
@@ -61,43 +93,32 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         window: SendWindow,
         post: Post,
         new_root: Callable[[], str],
-        colours: str,
         appears: Callable[[CapabilityMap], None],
     ) -> None:
-        self._window, self._to, self._new_root = window, post, new_root
-        self._appears, self._unseen = appears, False
-        self._drawn_as = Look("share", colours)
-        self._reader: Subscription[CapabilityMap] | None = None
-        self._state: views.State = "ready"
-        self._blocks = (0, 0)
-        self._request: MapRequest | None = None  # the map that was started last
-        self._locked = stage.now.options.constraints.locks(stage.now.robot)  # joints locked in the map
-        self._found: CapabilityMap | None = None
+        self._window, self._to, self._new_root, self._appears = window, post, new_root, appears
         self._voxels: Voxels | None = None
-        self._drawn = 0.0
-        self._drawn_root = ""
-        self._old = False  # the voxels must be redrawn
+        self._painted = 0.0
         self._mark: viser.FrameHandle | None = None
-        self._marked: tuple[CapabilityMap, int] | None = None  # the map and row of the clicked voxel
         super().__init__(stage)
 
     def post(self, key: Hashable, value: object = None) -> None:
         self._to(key, value)
 
     def panel(self) -> Sequence[Node]:
-        (done, total), found, settings, units = self._blocks, self._found, self.settings, self.stage.units
+        f, found, s, units = self.read, self.read.found, self.settings, self.stage.units
         legend, facts, pick = (Html(str, key=key) for key in ("legend", "facts", "pick"))
-        if found is not None:
-            legend = Html(views.legend, (found, settings.by, self._drawn_as.map, settings.least), key="legend")
-            facts = Html(views.facts, (found, self._locked, self._state == "done", units), key="facts")
-        if self._marked is not None:
-            pick = Html(views.picked, (*self._marked, units), key="pick")
+        if found is not None and s.request is not None:
+            locked = s.request.constraints.locks(s.request.robot)
+            legend = Html(views.legend, (found, s.by, s.colours, s.least), key="legend")
+            facts = Html(views.facts, (found, locked, f.state == "done", units), key="facts")
+        if s.picked is not None:
+            pick = Html(views.picked, (*s.picked, units), key="pick")
         events = {
             "Start": self.event(self.on_start),
-            "Stop": self.event(self._stop, "stopped"),
+            "Stop": self.event(self.on_stop),
             "Clear": self.event(self.clear),
         }
-        names = views.buttons(self._state, self._request != self._requested)
+        names = views.buttons(f.state, s.request != f.requested)
         return [
             Folder(
                 "Capability",
@@ -106,8 +127,8 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
                     Control("resolution"),
                     Control("directions"),
                     Buttons("Map", events, MAP_HINT, names),
-                    Progress(round(PERCENT * done / total, 1) if total else 0.0),
-                    Html(views.progress, (self._state, done, total)),
+                    Progress(round(PERCENT * f.map.done / f.map.total, 1) if f.map.total else 0.0),
+                    Html(views.progress, (f.state, f.map.done, f.map.total)),
                     Control("by"),
                     legend,
                     Control("least"),
@@ -121,100 +142,86 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
     @property
     def extent(self) -> Sphere | None:
         """A sphere around the map, complete or not, without the corners of its grid, which are empty."""
-        if self._found is None or not len(self._found.index):
+        found = self.facts.found
+        if found is None or not len(found.index):
             return None
-        grid = self._found.grid
-        sides = np.array(grid.shape) * grid.voxel
-        return np.array(grid.origin) + sides / 2.0, float(sides.max()) / 2.0
+        sides = np.array(found.grid.shape) * found.grid.voxel
+        return np.array(found.grid.origin) + sides / 2.0, float(sides.max()) / 2.0
 
     @property
     def empty(self) -> bool:
         """Whether there is no map, and none is being computed."""
-        return self._found is None and self._reader is None
+        return self.facts.found is None and self.facts.state not in ("waiting", "computing")
 
-    @property
-    def wait(self) -> float | None:
-        """Seconds until the next poll, as `Feature.due`."""
-        return POLL if self._reader is not None or self._old else None
+    def running(self) -> Sequence[Work]:
+        s = self.settings
+        if s.request is None or s.stopped is not None:
+            return ()
+        return [Work("map", self.stage.maps.subscribe, (s.request,), poll=POLL)]
+
+    def worked(self, key: str) -> None:
+        found = self.facts.found
+        if self.settings.unseen and found is not None and len(found.index):
+            self.change(unseen=False)
+            self._appears(found)
+        if self.facts.state != "out of time":
+            super().worked(key)
 
     def poll(self, now: float, moving: bool) -> None:
         """Poll the map, and redraw it if it has changed; `moving`: frames of the arm have priority."""
-        reader = self._reader
-        if reader is not None:
-            self._blocks = (reader.done, reader.total)
-            self._state = "computing" if reader.total else "waiting"
-            if reader.latest is not self._found:
-                self._found, self._old = reader.latest, True
-            if reader.finished:
-                self._finish(reader)
-            self._stale = True
-        if self._unseen and self._found is not None and len(self._found.index):
-            self._unseen = False
-            self._appears(self._found)
-        if self._old and self._found is not None and now - self._drawn >= REDRAW and self._window.is_open(moving):
-            self._drawn = now
-            self._draw_map(self._found)
-        if self._stale:
-            self.refresh()
+        try:
+            self.tick(now)
+        finally:
+            found, look = self.facts.found, self.settings.look
+            if found is not None and not self._is_drawn(found, look):
+                if now - self._painted >= REDRAW and self._window.is_open(moving):
+                    self._painted = now
+                    self._draw_map(found, look)
+                else:
+                    self.due = min(POLL, POLL if self.due is None else self.due)
 
     def on_start(self) -> None:
         """Compute a map for a visitor, who sees it for the first time."""
         self.compute()
-        self._unseen = True
+        self.change(unseen=True)
+
+    def on_stop(self) -> None:
+        """Stop computing; the part computed so far stays."""
+        if self.facts.state in ("waiting", "computing"):
+            self.change(stopped=self.facts.map)
 
     def compute(self) -> None:
         """Compute the map of the selected robot, and draw it while it grows."""
         self.clear()
-        stage, self._request = self.stage, self._requested
-        self._reader = stage.maps.subscribe(self._request)
-        self._locked = stage.now.options.constraints.locks(stage.now.robot)
-        self._state = "waiting"
-        self._stale = True
-
-    @property
-    def _requested(self) -> MapRequest:
-        """The map that settings and locks describe."""
-        settings, stage = self.settings, self.stage
-        return MapRequest(stage.now.robot, settings.resolution, settings.directions, stage.now.options.constraints)
+        self.invalidate()
+        self.change(request=self.facts.requested)
 
     def clear(self) -> None:
         """Stop, and remove everything."""
-        self._stop("ready")
+        self._runner.end()
+        self.change(request=None, stopped=None, unseen=False)
         if self._voxels is not None:
             self._voxels.remove()
-        self._voxels = self._found = None
-        self._old = self._unseen = False
-        self._state, self._blocks = "ready", (0, 0)
+            self._voxels = None
         self._forget_pick()
-        self._stale = True
-
-    def leave(self) -> None:
-        """Leave the shared computation."""
-        if self._reader is not None:
-            self._reader.leave()
-            self._reader = None
+        self.schedule()
 
     def use_look(self, colours: str, cut: Cut | None, shown: NDArray[np.bool_] | None) -> None:
         """Draw in these colours, and only these slabs of this cut."""
-        self._drawn_as = replace(self._drawn_as, map=colours, cut=cut, shown=shown)
-        self._old = self._found is not None
-        self._stale = True
+        self.change(colours=colours, cut=cut, shown=shown)
 
     def state(self) -> dict[str, object]:
-        return {**super().state(), "drawn": self._state in ("waiting", "computing", "done")}
+        self.invalidate()
+        return {**super().state(), "drawn": self.facts.state in ("waiting", "computing", "done")}
 
     def restore(self, state: dict[str, object]) -> None:
         super().restore(state)
-        self.changed("by")
         self.changed("least")
         if state.get("drawn") is True:
             self.compute()
 
     def changed(self, path: str) -> None:
-        if path == "by" and self._drawn_as.by != self.settings.by:
-            self._drawn_as = replace(self._drawn_as, by=self.settings.by)
-            self._old = self._found is not None
-        elif path == "least" and self._voxels is not None:
+        if path == "least" and self._voxels is not None:
             self._voxels.show(self.settings.least)
 
     def started(self) -> None:
@@ -222,63 +229,39 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
 
     def on_voxel(self, root: str, level: int, instance: int) -> None:
         """Mark the clicked voxel and show its numbers."""
-        row = (
-            self._voxels.voxel(level, instance) if self._voxels is not None and root == self._drawn_root else None
-        )
-        if self._voxels is None or row is None:
+        voxels = self._voxels
+        row = voxels.voxel(level, instance) if voxels is not None and root == voxels.root else None
+        if voxels is None or row is None:
             return  # redrawn since
         self._forget_pick()
-        found = self._voxels.found
-        self._mark = mark(self.stage.client.scene, self._new_root(), found, row)
-        self._marked = (found, row)
+        self._mark = mark(self.stage.client.scene, self._new_root(), voxels.found, row)
+        self.change(picked=(voxels.found, row))
 
-    def _stop(self, state: views.State) -> None:
-        """Stop computing; the part computed so far stays."""
-        if self._reader is not None:
-            self.leave()
-            self._state = state
-            self._stale = True
+    def _is_drawn(self, found: CapabilityMap, look: Look) -> bool:
+        voxels = self._voxels
+        return (
+            voxels is not None and voxels.found is found and same(vars(look).values(), vars(voxels.look).values())
+        )
 
-    def _finish(self, reader: Subscription[CapabilityMap]) -> None:
-        """Take the complete map, or the error."""
-        self.leave()
-        error = reader.future.exception()
-        if isinstance(error, MapTimeError):
-            self._found, self._old = reader.latest, True
-            self._state = "out of time"
-            return
-        if error is not None:
-            self._state = "failed"
-            self.refresh()
-            raise error
-        self._found, self._old = reader.future.result(), True
-        self._state = "done"
-
-    def _draw_map(self, found: CapabilityMap) -> None:
-        old = self._voxels
-        scene = self.stage.client.scene
-        # The root identifies the clicked map: a click may come from nodes that are being replaced.
-        root = self._new_root()
+    def _draw_map(self, found: CapabilityMap, look: Look) -> None:
+        old, root = self._voxels, self._new_root()
         self._voxels = Voxels(
-            scene,
+            self.stage.client.scene,
             root,
             found,
-            self._drawn_as,
+            look,
             self.settings.least,
             lambda level, instance: self.post(("do", self.event(self.on_voxel, root, level, instance), 0, 0)),
         )
-        self._drawn_root = root
         if old is not None:
             old.remove()
-        self._old = False
         self._window.sent(COST * self._voxels.sent)
-        self._stale = True
 
     def _forget_pick(self) -> None:
         if self._mark is not None:
             self._mark.remove()
             self._mark = None
-        self._marked = None
+        self.change(picked=None)
 
 
 def _note(text: str) -> str:

@@ -5,8 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from app.viewer.declared.fields import Settings, choice, number
+import numpy as np
+from numpy.typing import NDArray
+
+from app.shared.maps import MapRequest
+from app.viewer.declared.fields import Settings, choice, memory, number
+from app.viewer.declared.work import Result
+from app.viewer.tabs.workspace.colours import MAPS
+from app.viewer.tabs.workspace.cut import Cut
 from kin import Robot
+from kin.workspace import CapabilityMap
 
 By = Literal["share", "manipulability"]
 SIZES = {"15 voxels long": 15, "25 voxels long": 25, "40 voxels long": 40}
@@ -37,6 +45,16 @@ LEAST_HINT = "Hides voxels below this share of the map's best value"
 
 
 @dataclass(frozen=True)
+class Look:
+    """How the map is drawn: quantity, colours, cut, and the visible slabs."""
+
+    by: By
+    map: str
+    cut: Cut | None = None
+    shown: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
 class MapSettings(Settings):
     """The settings of a map.
 
@@ -44,6 +62,11 @@ class MapSettings(Settings):
         resolution, directions: of the map.
         by: the coloured quantity.
         least: the smallest visible value, relative to the map's largest, 0 to 1.
+        colours, cut, shown: those of the tab: the colour map, the cut, and its slabs that are seen.
+        request: the map that was started last.
+        stopped: what it had come to when the visitor stopped it.
+        unseen: whether the visitor has started it and has seen nothing of it.
+        picked: the map and the row of the clicked voxel.
     """
 
     resolution: int = choice("Grid", SIZES, 25, hint=GRID_HINT)
@@ -60,3 +83,15 @@ class MapSettings(Settings):
         digits=6,
         clip=True,
     )
+    colours: str = memory(next(iter(MAPS)), renew=False)
+    cut: Cut | None = memory()
+    shown: NDArray[np.bool_] | None = memory()
+    request: MapRequest | None = memory()
+    stopped: Result | None = memory()
+    unseen: bool = memory(False)
+    picked: tuple[CapabilityMap, int] | None = memory()
+
+    @property
+    def look(self) -> Look:
+        """How the map is to be drawn."""
+        return Look(self.by, self.colours, self.cut, self.shown)

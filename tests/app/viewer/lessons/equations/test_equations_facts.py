@@ -13,6 +13,7 @@ from bare_page import STORE, bare_page
 import kin
 from app.equations import book
 from app.viewer.arm import Arm
+from app.viewer.declared.work import Result
 from app.viewer.lessons.equations.facts import EquationsFacts
 from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.lessons.equations.settings import EquationsSettings
@@ -22,7 +23,7 @@ AXES, COLUMNS = "xyz", "noap"
 
 
 def facts(robot: kin.Robot, q: np.ndarray, equation: str = "") -> EquationsFacts:
-    return EquationsFacts(EquationsSettings(equation), Arm(robot, q, q), book(robot))
+    return EquationsFacts(EquationsSettings(equation), Arm(robot, q, q), {"book": Result(book(robot))})
 
 
 @ARMS
@@ -77,7 +78,7 @@ def test_it_begins_with_a_misprint_if_there_is_one_that_can_be_read(robot: kin.R
 
 def test_a_link_that_is_made_while_equations_are_derived_keeps_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = STORE.get("pioneer5")
-    monkeypatch.setattr(EquationsLesson, "_derive", lambda self: None)
+    monkeypatch.setattr(EquationsLesson, "running", lambda self: ())
     with bare_page(robot) as page:
         lesson = page.open(EquationsLesson)
         assert lesson.state() == {}

@@ -156,7 +156,7 @@ def test_numbers_are_on_show_when_they_are_answered_or_wanted(robot: Robot) -> N
     known, count = facts(robot, 0), len(facts(robot, 0).keys)
     assert known.opened == (False,) * count
     answered = (True, *[False] * (count - 1))
-    assert replace(known, answered=answered).opened == answered
+    assert replace(known, settings=replace(known.settings, answered=answered)).opened == answered
     assert replace(known, settings=replace(known.settings, all=True)).opened == (True,) * count
 
 

@@ -14,7 +14,6 @@ import kin
 from app.viewer.arm import Arm
 from app.viewer.lessons.redundancy.facts import RedundancyFacts
 from app.viewer.lessons.redundancy.settings import RedundancySettings
-from app.viewer.lessons.redundancy.views import frame_origins
 
 ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
 TASKS: tuple[kin.ik.Task, ...] = ("pose", "approach", "position")
@@ -23,7 +22,7 @@ TASKS: tuple[kin.ik.Task, ...] = ("pose", "approach", "position")
 def facts(robot: kin.Robot, q: np.ndarray, task: kin.ik.Task, goal: np.ndarray | None = None) -> RedundancyFacts:
     goal = q if goal is None else goal
     arm = Arm(robot, q, goal, task=task, locks=(False,) * robot.n)
-    return RedundancyFacts(RedundancySettings(), arm, numpy_arm.pose(robot, goal), frame_origins(robot, goal))
+    return RedundancyFacts(RedundancySettings(), arm)
 
 
 def rows(robot: kin.Robot, q: np.ndarray, task: kin.ik.Task) -> np.ndarray:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from bare_page import STORE, bare_page
 
 from app.viewer.arm import Arm
-from app.viewer.declared.scene import Node
+from app.viewer.declared.scene import Lazy, Node
 from app.viewer.lessons.rotations.conventions import CONVENTIONS
 from app.viewer.lessons.rotations.facts import RotationsFacts
 from app.viewer.lessons.rotations.frames import Motion
@@ -86,29 +87,29 @@ def test_another_convention_keeps_the_rotation_even_in_one_batch_of_events(monke
 
 @pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda each: each.key)
 def test_turns_are_shown_one_after_another_about_their_axes(convention) -> None:
-    angles, turning, R = (0.4, -0.7, 1.1), Turning(0, 2, 10.0), np.eye(3)
+    angles, R = (0.4, -0.7, 1.1), np.eye(3)
     for k, (axis, angle) in enumerate(zip(convention.axes, angles, strict=True)):
-        begun, way = 10.0 + k * (TIME + REST), "xyz".index(axis)
+        begun, way = k * (TIME + REST), "xyz".index(axis)
         before = R
         for share in (0.0, 0.3, 0.9):  # about the same axis all the time
-            now = begun + share * TIME
-            assert turning.turn(now) == k
-            shown = convention.rotation(turning.angles(angles, now))
+            turning = Turning(0, 2, begun + share * TIME)
+            assert turning.turn == k
+            shown = convention.rotation(turning.angles(angles))
             step = shown @ before.T if convention.fixed else before.T @ shown
             part = math.copysign(math.acos(min(1.0, (np.trace(step) - 1) / 2)), angle)
             assert step == pytest.approx(turned(way, part), abs=1e-7)
             assert abs(part) < abs(angle)
         turn = turned(way, angle)
         R = turn @ R if convention.fixed else R @ turn
-        for now in (begun + TIME, begun + TIME + 0.9 * REST):
-            assert convention.rotation(turning.angles(angles, now)) == pytest.approx(R, abs=1e-12)
-    assert turning.turn(10.0 + 3 * (TIME + REST) + 1e-6) == 3
+        for passed in (begun + TIME, begun + TIME + 0.9 * REST):
+            assert convention.rotation(Turning(0, 2, passed).angles(angles)) == pytest.approx(R, abs=1e-12)
+    assert Turning(0, 2, 3 * (TIME + REST) + 1e-6).turn == 3
     assert pytest.approx(convention.rotation(angles), abs=1e-12) == R
 
 
-def turned_frame(lesson: RotationsLesson) -> Node:
-    """The frame beside the arm, as it is drawn now."""
-    (lazy,) = lesson.scene()
+def turned_frame(nodes: Sequence[Lazy]) -> Node:
+    """The frame beside the arm in a scene of the lesson."""
+    (lazy,) = nodes
     (beside,) = lazy.view(*lazy.args)
     return next(node for node in beside.children if node.key == "turned")
 
@@ -123,21 +124,21 @@ def test_the_frame_turns_when_it_is_clicked_or_a_convention_is_chosen(monkeypatc
     monkeypatch.setattr("app.viewer.lessons.rotations.turning.REST", 0.1)
     with bare_page(ROBOT) as page:
         lesson = page.open(RotationsLesson)
-        R, seen = lesson.facts.R, []
-        draw = lesson.draw
-        monkeypatch.setattr(lesson, "draw", lambda: (draw(), seen.append(rotation_of(turned_frame(lesson)))))
-        assert turned_frame(lesson).click == ("on_turn", 0, 2)
-        assert np.allclose(rotation_of(turned_frame(lesson)), R)
+        R, seen, scene = lesson.facts.R, [], lesson.scene
+        monkeypatch.setattr(lesson, "scene", lambda: (seen.append(rotation_of(turned_frame(scene()))), scene())[1])
+        assert turned_frame(lesson.scene()).click == ("on_turn", 0, 2)
+        assert np.allclose(rotation_of(turned_frame(lesson.scene())), R)
         match by:
             case "click":
-                lesson.post(("do", turned_frame(lesson).click, 0, 0))
+                lesson.post(("do", turned_frame(lesson.scene()).click, 0, 0))
             case "convention":
                 page.set("Angles", "Z-Y-Z moving")
             case "button":
                 page.set("Turn", "2nd")
+        seen.clear()
         page.rest()
         assert not np.allclose(seen[0], R, atol=1e-3)
-        assert np.allclose(rotation_of(turned_frame(lesson)), R), "and ends where it was"
+        assert np.allclose(rotation_of(turned_frame(lesson.scene())), R), "and ends where it was"
         assert np.allclose(lesson.facts.R, R)
 
 
@@ -148,7 +149,7 @@ def test_a_question_about_the_forms_shows_no_turn() -> None:
         lesson.on_activity()
         lesson.post(("do", ("on_turn", 0, 2), 0, 0))
         page.rest()
-        assert np.allclose(rotation_of(turned_frame(lesson)), lesson.facts.R)
+        assert np.allclose(rotation_of(turned_frame(lesson.scene())), lesson.facts.R)
         page.activity.withheld = frozenset()
 
 

@@ -1,0 +1,241 @@
+"""What goes on in a feature by itself, and facts that last as long as what they have read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pytest
+from bare_page import STORE, bare_page
+
+from app.shared.computations import ComputationCache, SharedComputation
+from app.viewer.arm import Arm
+from app.viewer.declared.facts import ArmReads, Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import Settings, memory
+from app.viewer.declared.panel import Html, Node
+from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.scene import frame
+from app.viewer.declared.work import Runner, Sweep, Work
+from kin import InputError
+
+UR5 = STORE.get("ur5")
+
+
+def runner() -> Runner:
+    return Runner(lambda: None)
+
+
+def work(begin: Callable[..., Any], *args: object, **more: Any) -> Work:
+    return Work("one", begin, args, **more)
+
+
+def items(*found: object) -> Callable[..., Iterator[object]]:
+    return lambda *_: iter(found)
+
+
+def test_work_is_done_once_for_its_arguments_and_again_for_others() -> None:
+    asked: list[object] = []
+    one = runner()
+
+    def begin(x: np.ndarray) -> float:
+        asked.append(x)
+        return float(x.sum())
+
+    for x in (np.ones(2), np.ones(2), np.zeros(2)):
+        again, _ = one.go_on([work(begin, x)], 0.0)
+        assert again is None
+    assert len(asked) == 2
+    assert one.results["one"].value == 0.0
+    assert one.go_on([], 0.0) == (None, [])
+    assert one.results == {}, "what is no longer declared has no result"
+
+
+def test_an_iterator_gives_one_item_a_time_each_the_result_so_far() -> None:
+    one, declared = runner(), [work(items(None, 1, None, 2))]
+    values, news = [], []
+    while (found := one.go_on(declared, 0.0))[0] is not None:
+        news += found[1]
+        values.append(one.results["one"].value if "one" in one.results else None)
+    assert values == [None, 1, 1, 2, 2]
+    assert news == ["one"] * 3, "two results and the end"
+    assert one.results["one"].finished
+
+
+def test_only_one_slice_is_taken_at_a_time_and_the_first_work_comes_first() -> None:
+    one = runner()
+    declared = [Work("a", items(1, 2)), Work("b", items(3))]
+    order = []
+    while one.go_on(declared, 0.0)[0] is not None:
+        order.append({key: found.value for key, found in one.results.items()})
+    assert order[0] == {"a": 1}
+    assert order[-1] == {"a": 2, "b": 3}
+
+
+def test_work_begins_when_its_arguments_rest_and_not_more_often_than_its_pace() -> None:
+    one = runner()
+    for now, x in ((0.0, 1), (0.1, 2), (0.2, 3)):
+        assert one.go_on([work(abs, x, rest=0.25)], now) == (0.25, [])
+    assert one.go_on([work(abs, 3, rest=0.25)], 0.5) == (None, ["one"])
+    two = runner()
+    assert two.go_on([work(abs, -1, pace=0.2, keep=True)], 1.0) == (None, ["one"])
+    again, _ = two.go_on([work(abs, -2, pace=0.2, keep=True)], 1.05)
+    assert again == pytest.approx(0.15)
+    assert two.results["one"].value == 1, "the last result stays"
+    two.go_on([work(abs, -3, pace=0.2, keep=True)], 1.3)
+    assert two.results["one"].value == 3
+
+
+def test_what_is_under_way_is_finished_first_if_its_result_is_kept_and_dropped_otherwise() -> None:
+    for keep, expected in ((True, [1, 1, 1, 1, 2, 2]), (False, [2, 2])):
+        one, values = runner(), []
+        assert one.go_on([work(lambda x: iter([None, x, x]), 1, keep=keep)], 0.0)[0] == 0.0
+        while one.go_on([work(lambda x: iter([None, x]), 2, keep=keep)], 1.0)[0] is not None:
+            found = one.results.get("one")
+            values += [] if found is None else [found.value]
+        assert values == expected
+
+
+def test_errors_are_results() -> None:
+    def broken() -> Iterator[int]:
+        yield 1
+        raise ValueError("why")
+
+    one = runner()
+    while one.go_on([work(broken)], 0.0)[0] is not None:
+        pass
+    found = one.results["one"]
+    assert (found.value, found.finished, str(found.error)) == (1, True, "why")
+    one.go_on([Work("two", lambda: 1 // 0)], 0.0)
+    assert isinstance(one.results["two"].error, ZeroDivisionError)
+
+
+def test_a_shared_computation_tells_its_progress_and_is_left() -> None:
+    starts, began, goes_on, woke = Event(), Event(), Event(), Event()
+    cache = ComputationCache[str](ThreadPoolExecutor(1), 4)
+
+    def compute(shared: SharedComputation[str]) -> str:
+        assert starts.wait(30)
+        shared.done, shared.total, shared.latest = 1, 2, "half"
+        began.set()
+        assert goes_on.wait(30)
+        shared.check()
+        return "whole"
+
+    one = Runner(woke.set)
+    declared = [work(lambda: cache.subscribe("key", compute), poll=0.5)]
+    one.go_on(declared, 0.0)
+    starts.set()
+    assert began.wait(30)
+    assert one.go_on(declared, 0.1) == (0.5, ["one"])
+    found = one.results["one"]
+    assert (found.value, found.done, found.total, found.finished) == ("half", 1, 2, False)
+    goes_on.set()
+    assert woke.wait(30)
+    assert one.go_on(declared, 0.2)[1] == ["one"]
+    assert (one.results["one"].value, one.results["one"].finished) == ("whole", True)
+
+    goes_on.clear()
+    two = runner()
+    two.go_on([work(lambda: cache.subscribe("other", compute))], 0.0)
+    assert "other" in cache
+    two.go_on([], 0.0)
+    assert "other" not in cache, "nobody waits for it"
+    goes_on.set()
+
+
+def test_a_motion_gets_the_seconds_that_have_passed_but_no_long_pause() -> None:
+    passed: list[float] = []
+    one, declared = runner(), [Sweep(passed.append, 0.25)]
+    assert one.go_on(declared, 1.0)[0] == 0.25
+    assert one.go_on(declared, 1.1)[0] == pytest.approx(0.15)
+    one.go_on([Sweep(passed.append, 0.25, most=9.0)], 1.5)
+    one.go_on(declared, 9.0)
+    assert passed == [0.1, pytest.approx(0.5), 0.1]
+
+
+# Facts
+
+
+def test_an_arm_follows_another_one_as_long_as_all_that_was_read_is_the_same() -> None:
+    q, other = UR5.q_home, UR5.q_home + 0.1
+    first = Arm(UR5, q, q)
+    reads = ArmReads(first)
+    assert reads.follow(Arm(UR5, other, q)), "nothing was read"
+    assert reads.q is other
+    assert reads.follow(Arm(UR5, other.copy(), other))
+    assert not reads.follow(Arm(UR5, q, q))
+    assert reads.q.tolist() == other.tolist(), "it stays what it was"
+    of_goal = ArmReads(first)
+    assert of_goal.aim is first.T_goal
+    assert of_goal.follow(Arm(UR5, other, q))
+    assert of_goal.contacts_at(q) == ()
+    assert of_goal.follow(Arm(UR5, other, q, target=first.T_goal.copy())), "the same pose is wanted"
+    assert not of_goal.follow(Arm(UR5, other, other))
+
+
+@dataclass(frozen=True)
+class Nothing(Settings):
+    ticks: int = memory(0)
+    runs: bool = memory(False)
+
+
+class Still(DeclaredFeature[Nothing, Facts[Nothing]]):
+    """Its panel reads the goal, its scene nothing."""
+
+    key, title, settings_of, facts_of = "still", "Still", Nothing, Facts
+
+    def started(self) -> None:
+        self.panels, self.scenes = 0, 0
+
+    def panel(self) -> Sequence[Node]:
+        self.panels += 1
+        return [Html("{} {}".format, (self.read.arm.goal.tolist(), self.settings.ticks))]
+
+    def scene(self) -> Sequence[SceneNode]:
+        self.scenes += 1
+        return [frame("one")]
+
+    def running(self) -> Sequence[Work | Sweep]:
+        fail = [Work("fails", self.fail)] if self.settings.ticks == 3 else []
+        return [*fail, *([Sweep(self.count, 0.01)] if self.settings.runs else [])]
+
+    def count(self, seconds: float) -> None:
+        self.change(ticks=self.settings.ticks + 1, runs=self.settings.ticks < 2)
+
+    def fail(self) -> None:
+        raise InputError("this", 5, "something else")
+
+
+def test_a_panel_and_a_scene_that_do_not_read_the_configuration_are_not_made_again_for_it() -> None:
+    with bare_page(UR5) as page:
+        still = page.open(Still)
+        made = still.panels, still.scenes
+        for k in range(1, 4):
+            page.now = replace(page.now, q=UR5.q_home + 0.1 * k)
+            still.on_pose(page.now.T_tool)
+            page.rest()
+        assert (still.panels, still.scenes) == made
+        assert still.read.q is page.now.q, "facts are those of the arm on show"
+        for k in range(1, 4):
+            page.now = replace(page.now, goal=UR5.q_home + 0.1 * k)
+            still.on_pose(page.now.T_tool)
+            page.rest()
+        assert still.panels == made[0] + 3
+
+
+def test_a_motion_changes_settings_that_are_shown_and_errors_of_work_are_raised_after_it_is() -> None:
+    with bare_page(UR5) as page:
+        still = page.open(Still)
+        still.change(runs=True)
+        still.schedule()
+        with pytest.raises(InputError, match="this: got 5"):
+            page.rest()
+        assert still.settings.ticks == 3
+        page.rest()
+        assert not still.settings.runs
+        assert page.panel()[0]["content"].endswith(" 3")
