@@ -334,7 +334,7 @@ FIELDS = {
     "ProgramTab": 13,
     "RobotTab": 6,
     "Screen": 9,
-    "Workspace": 13,
+    "Workspace": 12,
 }
 FEATURE = re.compile(r"(Feature|Lesson|Screen)\b")
 NOT_PRIVATE = {"_replace", "_asdict", "_fields", "_make", "_repr_html_"}  # of named tuples and IPython

@@ -67,7 +67,7 @@ class RobotTab(Feature):
         self._converting = False
         gui = stage.client.gui
         self._html = {name: add_html(gui) for name in PARTS}
-        self._comparing = Comparing(stage, self.post)
+        self._comparing = Comparing(stage, self._post_comparing)
         self._html |= {name: add_html(gui) for name in ("files", "doctor")}
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._beginnings.start,
@@ -90,7 +90,6 @@ class RobotTab(Feature):
             "other-text": self._take_other,
             "apply": lambda index: self._try(lambda: self._comparing.proposed(index, self._own)),
             "compare-stop": lambda _: self._comparing.stop(),
-            "walk": self._comparing.walk,
         }
         self._refresh()
 
@@ -115,14 +114,20 @@ class RobotTab(Feature):
             case ("arriving", "other-text") if isinstance(value, IncomingFile):
                 if value.failure:
                     self._refuse(*value.notice)
+            case ("comparing", inner):
+                self._comparing.handle(inner, value)
+                self._plan()
             case (str(name),) if name in self._handlers:
                 self._handlers[name](value)
                 self._plan()
             case _:
                 raise InputError("robot", key, "the key of a field or a button")
 
+    def _post_comparing(self, key: Hashable, value: object = None) -> None:
+        self.post(("comparing", key), value)
+
     def tick(self, now: float) -> None:
-        self._comparing.tick()
+        self._comparing.tick(now)
         self._plan()
 
     def _plan(self) -> None:
@@ -165,16 +170,18 @@ class RobotTab(Feature):
         self._uploads.waiting = None
         self._revision += self._editing == ""
         self._refresh()
-        self._comparing.start()
+        self._comparing.on_robot()
         self._plan()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self._comparing.on_pose(self.stage.now.q)
+        self._comparing.on_pose(T_base_tool)
+        self._plan()
 
     def on_style(self) -> None:
         self._revision += 1
         self._refresh()
-        self._comparing.refresh()
+        self._comparing.on_style()
+        self._plan()
 
     def on_activity(self) -> None:
         if self.stage.activity.withheld != self._withheld:
@@ -446,5 +453,5 @@ class RobotTab(Feature):
 
     def on_leave(self) -> None:
         self._uploads.forget()
-        self._comparing.forget()
+        self._comparing.on_leave()
         self.stage.bodies.clear()

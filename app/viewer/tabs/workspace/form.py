@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 from app.viewer.declared.panel import Buttons, Control, Event, Folder, Html, Node, Progress
-from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.settings import FINE, MAX_POINTS, MIN_SIZE, NONE, WorkspaceSettings
 from app.viewer.views.templates import render
@@ -30,10 +29,11 @@ def spec(path: str) -> Any:
 
 
 def form(
-    settings: WorkspaceSettings, said: Said, robot: Robot, others: tuple[Robot, ...], cut: Cut | None, unit: Unit
+    settings: WorkspaceSettings, said: Said, robot: Robot, others: tuple[Robot, ...], unit: Unit, sizes: Html
 ) -> list[Node]:
     """Everything between cloud and tools, but for what has events of its own; `others`: robots to compare with."""
-    sizes = replace(spec("size"), step=unit.shown(MIN_SIZE, FINE))
+    cut = settings.cut
+    point = replace(spec("size"), step=unit.shown(MIN_SIZE, FINE))
     closed = [Control("axis"), Control("keep", visible=cut is not None)]
     if cut is not None:
         ends = cut.low, cut.high
@@ -45,7 +45,7 @@ def form(
         Control("by"),
         Control("map"),
         Html(str, (said.legend,), key="legend"),
-        Control("size", spec=sizes, label=f"Point size ({unit.name})"),
+        Control("size", spec=point, label=f"Point size ({unit.name})"),
         Folder("Cut open", closed),
         Folder(
             "Look closer",
@@ -56,7 +56,7 @@ def form(
                 Control("section"),
                 Control("axes"),
                 Control("sizes"),
-                Html(str, (said.sizes,), key="sizes"),
+                sizes,
             ],
         ),
     ]

@@ -14,7 +14,6 @@ class Said:
         buttons: what can be done with the cloud.
         legend: the meaning of its colours.
         picked: the clicked point.
-        sizes: the table of sizes.
     """
 
     line: str = ""
@@ -22,4 +21,3 @@ class Said:
     buttons: tuple[str, ...] = ("Start",)
     legend: str = ""
     picked: str = ""
-    sizes: str = ""

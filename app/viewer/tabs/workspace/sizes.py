@@ -1,4 +1,4 @@
-"""The sizes of a workspace: bounding box, reach, holes, volume and surface, computed in the background."""
+"""The sizes of a workspace as a table: bounding box, reach, holes, volume and surface."""
 
 from __future__ import annotations
 
@@ -6,69 +6,17 @@ import math
 
 from markupsafe import Markup
 
-from app.shared.computations import Subscription
-from app.viewer.feature import Stage
-from app.viewer.panel import Post
-from app.viewer.tabs.workspace.background import run_in_background
-from app.viewer.tabs.workspace.said import Said
 from app.viewer.views.templates import render
-from kin import Robot
 from kin.units import Unit, Units
 from kin.workspace import Estimate, Span, WorkspaceFacts
 
 SMALLEST_HOLE = 5e-4  # m; smaller holes are not reported
 
 
-class Sizes:
-    """The table of sizes. Posts ``"facts"`` to itself; `post` returns it to `take`."""
-
-    def __init__(self, stage: Stage, said: Said, post: Post) -> None:
-        self._stage = stage
-        self._said = said
-        self._post = post
-        self._visible = False
-        self._found: tuple[WorkspaceFacts, bool] | None = None  # sizes, and whether they are complete
-        self._computations: tuple[Subscription[WorkspaceFacts], ...] = ()
-
-    def show(self, visible: bool) -> None:
-        """Compute and show the sizes of the selected robot, or hide them."""
-        self.leave()
-        self._visible, self._found = visible, None
-        self._said.sizes = render("panel/note", text="Computing…") if visible else ""
-        if not visible:
-            return
-        robot, summaries = self._stage.now.robot, self._stage.summaries
-        # Volume and surface take longer than the rest.
-        rest, whole = summaries.facts(robot, effort=None), summaries.facts(robot)
-        self._computations = rest, whole
-
-        def work() -> None:
-            self._post("facts", (robot, rest.future.result(), False))
-            self._post("facts", (robot, whole.future.result(), True))
-
-        run_in_background(work, "sizes", self._post)
-
-    def leave(self) -> None:
-        """Do not wait for the sizes any more."""
-        for computation in self._computations:
-            computation.leave()
-        self._computations = ()
-
-    def take(self, robot: Robot, found: WorkspaceFacts, complete: bool) -> None:
-        """Take computed sizes, unless they are of a robot that is no longer selected."""
-        if self._visible and robot == self._stage.now.robot:
-            self._found = (found, complete)
-            self.refresh()
-
-    def refresh(self) -> None:
-        """Show the sizes in the present units."""
-        if self._found is not None:
-            found, complete = self._found
-            self._said.sizes = html(found, not complete, self._stage.units)
-
-
-def html(facts: WorkspaceFacts, waiting: bool, units: Units) -> str:
-    """The sizes as a table; `waiting`: volume and surface are still being computed."""
+def html(facts: WorkspaceFacts | None, waiting: bool, units: Units) -> str:
+    """The sizes as a table, if they are known; `waiting`: volume and surface are still being computed."""
+    if facts is None:
+        return render("panel/note", text="Computing…")
     unit = units.lengths
     rows = [
         *((name, _span(span, unit), unit.name) for name, span in (("x", facts.x), ("y", facts.y), ("z", facts.z))),

@@ -16,9 +16,11 @@ import numpy as np
 import kin
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
-from app.viewer.declared.panel import Buttons, Control, Node
+from app.viewer.declared.panel import Buttons, Control, Html, Node
+from app.viewer.declared.work import Work
 from app.viewer.feature import Stage
 from app.viewer.scene.camera import Sphere, round_points
+from app.viewer.tabs.workspace import sizes
 from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
@@ -26,14 +28,12 @@ from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import PointPicker
 from app.viewer.tabs.workspace.said import Said
-from app.viewer.tabs.workspace.section.panel import SectionPanel
+from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
-from app.viewer.tabs.workspace.sizes import Sizes
-from kin import Robot
 from kin.transforms import Array
 from kin.warmup import CAPABILITY, CLOUDS
-from kin.workspace import CapabilityMap, Section
+from kin.workspace import CapabilityMap
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
 DOT = 0.05  # s between two updates of the tool in the section plot
@@ -62,7 +62,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             stage, self._said, self.settings, window, self._new_root, lambda: self.post("more")
         )
         self._picker = PointPicker(stage, self._said, self._new_root, self.post)
-        self._sizes = Sizes(stage, self._said, self.post)
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene, self._new_root)
         self._plotted = self._dotted = self._moved = 0.0
@@ -82,9 +81,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             "failed": _raise,
             "click": self._search,
             "picked": lambda found: self._picker.take(*cast(tuple[Any, ...], found)),
-            "facts": lambda found: self._sizes.take(*cast(tuple[Any, ...], found)),
-            "section-found": self._take_section,
-            "outline-found": self._take_outline,
             "plotted": lambda made: self._section.show_cloud(made) if self._section is not None else None,
             "capability": self._capability.handle,
         }
@@ -109,8 +105,41 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         return [
             *nodes,
             *cloud(s, self._said, actions),
-            *form(s, self._said, robot, others, s.cut, unit),
+            *form(s, self._said, robot, others, unit, self._sizes()),
         ]
+
+    def _sizes(self) -> Html:
+        if not self.settings.sizes:
+            return Html(str, key="sizes")
+        whole = self.read.work("sizes").value
+        args = whole or self.read.work("extent").value, whole is None, self.stage.units
+        return Html(sizes.html, args, key="sizes")
+
+    # Long work
+
+    def running(self) -> Sequence[Work]:
+        robot, stage, works = self.facts.robot, self.stage, list[Work]()
+        if self.settings.sizes:  # volume and surface take longer than the rest
+            works += [
+                Work("extent", lambda arm: stage.summaries.facts(arm, effort=None), (robot,)),
+                Work("sizes", stage.summaries.facts, (robot,)),
+            ]
+        if self.settings.section:
+            works += [
+                Work("section", lambda arm, _: subscribe_section(stage.summaries, arm), (robot, self._section)),
+                Work(
+                    "outline", lambda arm, _: subscribe_section(stage.summaries, arm, True), (robot, self._section)
+                ),
+            ]
+        return works
+
+    def worked(self, key: str) -> None:
+        super().worked(key)
+        found, section = self.facts.work(key).value, self._section
+        if section is not None and key == "section":
+            section.take(found, self._tool)
+        elif section is not None and key == "outline":
+            section.take_outline(found, self._tool)
 
     # Events
 
@@ -127,6 +156,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         return (CAPABILITY,) if isinstance(key, tuple) and key[0] == "capability" else cls.kernels
 
     def on_robot(self) -> None:
+        self._runner.end()
         self._clear()
         self._capability.on_robot()
         robot = self.stage.now.robot
@@ -136,7 +166,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         if self._section is not None:
             self._show_section(False)
             self._show_section(True)
-        self._sizes.show(self.settings.sizes)
         self._show_axes()
         self.refresh()
         self.due = 0.0
@@ -152,7 +181,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._show_axes()
         self._clouds.show_legend()
         self._picker.refresh()
-        self._sizes.refresh()
         if self._section is not None:
             self._section.use(units)
         self._capability.refresh()
@@ -178,9 +206,10 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
                 self._cut_as(None)
             self._fit_view()
         finally:
-            self.refresh()
+            self.schedule()
+            super().tick(now)
             cloud_due = DOT if self._dot_due else self._clouds.next_tick(now, moving)
-            times = [due for due in (cloud_due, self._capability.due) if due is not None]
+            times = [due for due in (self.due, cloud_due, self._capability.due) if due is not None]
             self.due = min(times, default=None)
 
     def state(self) -> dict[str, object]:
@@ -202,9 +231,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             self._show_slabs()
         self._clouds.recolour()
         self._show_axes()
-        for name in ("section", "sizes"):
-            if getattr(before, name) != getattr(self.settings, name):
-                self.changed(name)
+        if before.section != self.settings.section:
+            self.changed("section")
         self._listen_clicks()
         if state.get("drawn") is True:
             self._start()
@@ -215,16 +243,13 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self.due = 0.0
 
     def on_leave(self) -> None:
+        super().on_leave()
         self._capability.on_leave()
-        self._sizes.leave()
-        if self._section is not None:
-            self._section.leave()
 
     def remove(self) -> None:
         super().remove()
         self._clear()
         self._capability.clear()
-        self._sizes.leave()
         self._axes.remove()
         self._show_section(False)
 
@@ -262,8 +287,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
                 self._show_axes()
             case "section":
                 self._show_section(self.settings.section)
-            case "sizes":
-                self._sizes.show(self.settings.sizes)
 
     def on_preset(self, number: int) -> None:
         """Take a common number of points."""
@@ -392,16 +415,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         if visible:
             self._tool = self.stage.now.T_tool[:3, 3]
             self._section = SectionPanel(self.stage, self._new_root(), self.post)
-
-    def _take_section(self, found: object) -> None:
-        if self._section is not None:
-            robot, section = cast(tuple[Robot, Section | None], found)
-            self._section.take(robot, section, self._tool)
-
-    def _take_outline(self, found: object) -> None:
-        if self._section is not None:
-            robot, outline = cast(tuple[Robot, Section | None], found)
-            self._section.take_outline(robot, outline, self._tool)
 
     def _update_section(self, now: float) -> None:
         """Move the tool's dot, and count new points into the plot."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.viewer.declared.scene import SceneView
+from app.viewer.declared.scene import Node
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import BLUE, VERMILION
 from app.viewer.scene.chain import link_poses
@@ -20,20 +20,20 @@ REACH = 0.3  # of an axis to both sides, relative to the radius of the sphere ar
 
 
 class Overlay:
-    """A ghost of `other` over the arm `shown`; the visitor's worker calls it.
+    """A ghost of `other` over the arm `shown`, as a comparison has found them.
 
     Different arms are laid over each other joint by joint: joints that the other one does not have, or of another
     kind, stay at its home.
     """
 
-    def __init__(self, view: SceneView, other: Robot, shown: Robot, found: Comparison) -> None:
-        self._view, self._other, self._shown = view, other, shown
+    def __init__(self, other: Robot, shown: Robot, found: Comparison) -> None:
+        self.found, self._other, self._shown = found, other, shown
         self._mapping = mapping_of(found, shown.n)
         self._base = inverse(self._mapping.base)
         self._figure = FigureNodes(body(shown).size)
 
-    def show(self, q: Array, joint: int) -> None:
-        """Draw both arms with the arm on show at `q` ``(n,)``, and the axes of one joint."""
+    def nodes(self, q: Array, joint: int) -> list[Node]:
+        """Both arms with the arm on show at `q` ``(n,)``, and the axes of one joint."""
         base, reach = self._base, REACH * body(self._shown).radius
         there = ghost_q(self._other, self._shown, self._mapping, q)
         copy = ghost("ghost", self._other, there, GHOST, OPACITY)
@@ -46,11 +46,7 @@ class Overlay:
             if joint < self._other.n:
                 T = base @ link_poses(self._other, there[None])[0, joint + 1]
                 nodes += figure.axis("other", T[:3, 3], -T[:3, 2], reach, f"{joint + 1}: the other", GHOST)
-        self._view.show(nodes)
-
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._view.remove()
+        return nodes
 
 
 def ghost_q(other: Robot, shown: Robot, mapping: Mapping, q: Array) -> Array:

@@ -45,7 +45,7 @@ def subscribe_section(summaries: Summaries, robot: Robot, signed: bool = False) 
 
 
 class SectionPanel:
-    """A panel to the left of the scene. Posts ``"section-found"``, ``"outline-found"``, ``"plotted"`` to itself.
+    """A panel to the left of the scene. Posts ``"plotted"`` to itself.
 
     Args:
         root: prefix of node names, never used before in this scene.
@@ -77,31 +77,9 @@ class SectionPanel:
         self._panel.dock_left()
         self._panel.set_width(WIDTH)
         self._panel.expand()  # on a phone it would be collapsed at the end of the sheet
-        self._computations = [
-            self._subscribe("section-found", signed=False),
-            self._subscribe("outline-found", signed=True),
-        ]
 
-    def _subscribe(self, key: str, signed: bool) -> Subscription[Section] | None:
-        """Start a computation that posts the robot and the section."""
-        found, robot, post = subscribe_section(self._stage.summaries, self.robot, signed), self.robot, self._post
-
-        def work() -> None:
-            post(key, (robot, None if found is None else found.future.result()))
-
-        run_in_background(work, key, post)
-        return found
-
-    def leave(self) -> None:
-        """Do not wait for the sections any more."""
-        for computation in self._computations:
-            if computation is not None:
-                computation.leave()
-
-    def take(self, robot: Robot, found: Section | None, tool: Array) -> None:
+    def take(self, found: Section | None, tool: Array) -> None:
         """Show a computed section; the tool is at `tool` ``(3,)``."""
-        if robot != self.robot or self._section is not None:
-            return
         if found is None or not found.curves:
             text = "No section: joint 1 is prismatic." if found is None else "The section is empty."
             self._html.content = render("workspace/section_note", text=text)
@@ -110,9 +88,9 @@ class SectionPanel:
         self._draw()
         self.tool_at(tool)
 
-    def take_outline(self, robot: Robot, found: Section | None, tool: Array) -> None:
+    def take_outline(self, found: Section | None, tool: Array) -> None:
         """Draw a computed boundary in the scene; the tool is at `tool` ``(3,)``."""
-        if robot != self.robot or self._outline is not None or found is None:
+        if found is None:
             return
         self._signed, self._left = found, np.cross(found.v, found.u)
         self._draw_outline(found)
@@ -183,7 +161,6 @@ class SectionPanel:
 
     def remove(self) -> None:
         """Close the panel and remove the outline."""
-        self.leave()
         self._panel.remove()
         if self._outline is not None:
             self._outline.remove()
