@@ -68,8 +68,8 @@ class PathRequest(OptionsBody):
     max_step: schemas.Number = Field(
         0.5,
         gt=0,
-        description="The most a joint may move between neighbouring waypoints, in radians (4 per metre for a "
-        "sliding joint); a larger step is a jump.",
+        description="The most a joint may move between neighbouring waypoints, in radians (of a sliding "
+        "joint as a share of the arm's reach); a larger step is a jump.",
     )
 
 

@@ -14,6 +14,7 @@ from kin.codegen.source import PRIMITIVES, OutsideSubsetError, Primitives, plain
 from kin.codegen.tree import Instance
 from kin.codegen.types import BOOL, FLOAT, INT, ArrayOf, Kernel, TupleOf
 from kin.codegen.typing import Program
+from kin.differential.metric import weights
 from kin.ik.candidates import Rows
 from kin.kernels.fk import fk_one
 from kin.kernels.jacobian import jacobian_one
@@ -27,7 +28,7 @@ from kin.transforms import Array
 STARTS = 64  # points over the limits from which `nearest` descends
 _V, _M = ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2)
 _ROWS = TupleOf((_M, _M, ArrayOf(BOOL, 1), ArrayOf(BOOL, 1), ArrayOf(INT, 1)), Rows._fields)
-_LIMITS = TupleOf((_V, _V, _V))
+_LIMITS = TupleOf((_V, _V, _V, _V))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ def arm_of(robot: Robot, closest: bool = True, primitives: Primitives = PRIMITIV
         held[parameter.joint] = 0.0
     constants = {
         "model": np.asarray(robot.model), "params": found.params, "signs": found.signs, "lower": robot.lower,
-        "upper": robot.upper, "turns": turns, "held": held,
+        "upper": robot.upper, "turns": turns, "held": held, "weights": weights(robot),
     }  # fmt: skip
     if closest:
         constants["starts"] = spread(robot.lower, robot.upper, STARTS)
@@ -109,7 +110,7 @@ def _entries(
     """The entries of an arm: kernel, types and shapes of the arguments."""
     n, k = robot.n, len(form.branches)
     kernels = Kernel(plain(found.rows)), Kernel(plain(found.inner))
-    q, T, limits = (n,), (4, 4), ((n,), (n,), (n,))
+    q, T, limits = (n,), (4, 4), ((n,), (n,), (n,), (n,))
     model, params, arcs = constants["model"].shape, found.params.shape, (entries.ROWS_OF_ARCS, 3)
     rows = (k, n), (k, 5), (k,), (k,), (k,)
     made = {

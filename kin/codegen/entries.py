@@ -32,7 +32,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Inner = Callable[..., Any]
-Limits = tuple[Array, Array, Array]  # lower, upper, whole turns
+Limits = tuple[Array, Array, Array, Array]  # lower, upper, whole turns, weights
 
 # What an entry answers with, as the generated files name it.
 SOLVED, APPROXIMATE, LIMITS, UNMET, ORIENTATION, UNREACHABLE = range(6)
@@ -49,7 +49,7 @@ def branches(
     value: float, arcs: Array, q: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """q ``(k, n)`` ← the rows of the closed form, of which some joints may be reversed: (gap, number of arcs)."""
-    lower, upper, _ = limits
+    lower, upper, _, _ = limits
     n = seed.shape[0]
     near, low, high = np.empty(n), np.empty(n), np.empty(n)
     for j in range(n):
@@ -76,12 +76,11 @@ def solve(
     seed not finite. value: that of the redundancy parameter, NaN for, of each branch, the one nearest to the
     seed's that the limits allow.
     """
-    lower, upper, turns = limits
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
         return INVALID, 0
     branches(rows, inner, params, signs, T, seed, limits, value, arcs, found.q)
-    pose = Requirement(model, np.zeros(7), lower, upper, turns, POSE, True, _POSITION, _ROTATION)
+    pose = _requirement(model, limits, POSE)
     count = measure_and_sort(pose, T, seed, seed, found)
     if count < 0:
         count = _with_seed(pose, T, seed, found) if math.isnan(value) else -1 - count
@@ -91,7 +90,7 @@ def solve(
     if blocked > 0:
         return LIMITS, blocked
     if seed.shape[0] < 6:
-        approach = Requirement(model, np.zeros(7), lower, upper, turns, APPROACH, True, _POSITION, _ROTATION)
+        approach = _requirement(model, limits, APPROACH)
         stats = np.empty(found.stats.shape)
         for i in range(found.q.shape[0]):
             for k in range(5):
@@ -105,6 +104,12 @@ def solve(
         if count > 0:
             return APPROXIMATE, count
     return UNMET, 0
+
+
+def _requirement(model: Array, limits: Limits, task: int) -> Requirement:
+    """What configurations are measured against, as `kin.solve_ik` does without options."""
+    lower, upper, turns, weights = limits
+    return Requirement(model, np.zeros(7), lower, upper, turns, weights, task, True, _POSITION, _ROTATION)
 
 
 def _is_valid(target: Array, seed: Array, T: Array) -> bool:
@@ -219,15 +224,15 @@ def nearest(
         count += 1
     task, weight, enough = (POSITION, 1.0, 1e-11) if point else (POSE, WEIGHT, 0.0)
     goal = (T, task, np.zeros(7), weight)
-    count = each_of(model, goal, limits, enough, MEETINGS, q[:count], costs)
+    lower, upper, turns, _ = limits
+    count = each_of(model, goal, (lower, upper, turns), enough, MEETINGS, q[:count], costs)
     best = 0
     for i in range(count):
         if costs[i] < costs[best] * (1.0 - _SHARE) - _ALIKE:
             best = i
     for j in range(n):
         found.q[0, j] = q[best, j]
-    lower, upper, turns = limits
-    pose = Requirement(model, np.zeros(7), lower, upper, turns, POSE, True, _POSITION, _ROTATION)
+    pose = _requirement(model, limits, POSE)
     measure_rows(pose, T, seed, seed, found.q[:1], found.stats[:1])
     if found.stats[0, 0] <= _POSITION and found.stats[0, 1] <= _ROTATION:
         return SOLVED

@@ -93,7 +93,7 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
     """The rows in `good` ``(k,)`` are the solutions."""
     touching = 0
     if problem.options.avoids:
-        if problem.options.prefer != "nearest":
+        if preferences.searches(problem, branches):
             preferences.improve(problem, branches, good)
         searched = avoidance.searchable(problem, branches, good)
         free = avoidance.free_rows(problem, branches, good)
@@ -108,11 +108,12 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
 
 def _ordered(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
     """The rows in `good` ``(k,)`` as solutions, in the preferred order."""
+    searches = preferences.searches(problem, branches)
+    if searches and not problem.options.avoids:
+        preferences.improve(problem, branches, good)
     if problem.options.prefer != "nearest":
-        if not problem.options.avoids:
-            preferences.improve(problem, branches, good)
         order = by_key(branches.q, good, preferences.ranks(problem, branches.q, branches.stats[:, DISTANCE]))
-    elif good is branches.good:
+    elif good is branches.good and not searches:
         order = branches.order
     else:
         order = by_key(branches.q, good, branches.stats[:, DISTANCE])

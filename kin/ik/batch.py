@@ -20,6 +20,7 @@ from typing import NamedTuple, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kin.differential.task import task_rows
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.branches import candidates_of
@@ -31,12 +32,13 @@ from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.contract import Candidates, ClosedForm, Many, One
+from kin.solvers.contract import APPROACH, Candidates, ClosedForm, Many, One
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
 _AT_ONCE = 1024  # targets of one compiled call
 _CACHE = "_batch"
+_SINGULAR = 1e-5  # smallest singular values of configurations that may be on a curve
 _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 
 
@@ -196,6 +198,7 @@ class _Stack:
         prepared, options, form = self.prepared, self.prepared.options, self.prepared.closed_form
         q = np.full((len(self.poses), prepared.robot.n), math.nan)
         plain = options.prefer == options.images == "nearest" and not options.avoids and prepared.branches is None
+        plain = plain and all(prepared.redundancies[k].rare for k in prepared.searched)
         if form is None or not form.handles(prepared.code) or not plain:
             return q
         quick = prepared.code in form.quick and options.respect_limits and not prepared.requested
@@ -223,7 +226,7 @@ class _Stack:
             self.found[i] = found
         q = np.empty((len(rows), self.prepared.robot.n))
         nearest_rows(self.prepared.requirement, T, seeds, np.stack([self.found[i].q for i in rows]), q)
-        return q
+        return _regular(self.prepared, q)
 
 
 def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Array:
@@ -237,7 +240,18 @@ def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Ar
         rows = np.empty((len(rest), len(form.branches), q.shape[1]))
         form.solve_many(T, near, prepared.lower, prepared.upper, rows)
         nearest_rows(prepared.requirement, T, near, rows, found)
-        q[rest] = found
+        q[rest] = _regular(prepared, found)
+    return q
+
+
+def _regular(prepared: IKProblem, q: Array) -> Array:
+    """q ``(k, n)``, in place NaN where a singular target may leave something free: the nearest is searched for."""
+    there = np.flatnonzero(~np.isnan(q[:, 0]))
+    if not prepared.searched:
+        return q
+    J = task_rows(prepared.robot, q[there], "approach" if prepared.code == APPROACH else "pose")
+    J[:, :3] /= prepared.unit
+    q[there[np.linalg.svd(J, compute_uv=False)[:, -1] < _SINGULAR]] = math.nan
     return q
 
 

@@ -41,6 +41,7 @@ class Requirement(NamedTuple):
         mask: ``(7,)`` weights of the six error coordinates, and 1.0 if they are in the base frame.
         lower, upper: ``(n,)`` joint limits.
         turns: ``(n,)`` 2π for a joint with whole-turn images, else 0.0.
+        weights: ``(n,)`` what a motion of each joint counts, see `kin.differential.metric.weights`.
         task: code of the task.
         respect: whether rows outside the limits are refused.
         position, rotation: errors that count as none, metres and radians.
@@ -51,6 +52,7 @@ class Requirement(NamedTuple):
     lower: Array
     upper: Array
     turns: Array
+    weights: Array
     task: int
     respect: bool
     position: float = _POSITION
@@ -125,7 +127,7 @@ def to_image(requirement: Requirement, near: Array, seed: Array, q: Array) -> tu
     for i in range(q.shape[0]):
         q[i], outside = image_inside(q[i], near[i], turns[i], lower[i], upper[i], respect)
         overrun += outside
-        distance += (q[i] - seed[i]) ** 2
+        distance += (requirement.weights[i] * (q[i] - seed[i])) ** 2
     return math.sqrt(distance), overrun
 
 
@@ -368,7 +370,7 @@ def _squared_distance(
         seed = seeds[which, j]
         value, outside = image_inside(rows[i, k, j], seed, turns[j], lower[j], upper[j], respect)
         rows[i, k, j] = value
-        total += (value - seed) ** 2
+        total += (requirement.weights[j] * (value - seed)) ** 2
         if not total < most or (respect and outside > 0.0):
             return math.inf
     return total
@@ -398,6 +400,6 @@ def _meets(requirement: Requirement, at: Array, targets: Array, i: int, e: Array
 @cache
 def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
     """`measure_and_sort` without type dispatch: arrays must be C-contiguous and of the types given in `Rows`."""
-    requirement = record(Requirement, MODEL, 1, 1, 1, 1, int, bool, float, float)
+    requirement = record(Requirement, MODEL, 1, 1, 1, 1, 1, int, bool, float, float)
     rows = record(Rows, 2, 2, row_of(bool), row_of(bool), row_of(int))
     return direct(measure_and_sort, requirement, (4, 4), 1, 1, rows)

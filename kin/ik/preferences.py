@@ -1,9 +1,10 @@
 """Preferences: which values redundancy parameters get.
 
-The solvers choose the value nearest to the seed. The other preferences search each branch for the best value:
-samples over its feasible ranges, then ever finer grids around the best sample. Values outside those
-ranges are never tried, so the choice is always feasible. Several redundancy parameters are searched one after
-another.
+The solvers of seven joints choose the value at which the configuration is nearest to the seed, the others the
+value nearest to the seed's own, which is not the same: a parameter that is free at a singular target moves other
+joints too. There, and for the other preferences, each branch is searched for the best value: samples over its
+feasible ranges, then ever finer grids around the best sample. Values outside those ranges are never tried, so the
+choice is always feasible. Several redundancy parameters are searched one after another.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
+from kin.ik.branches import Branches, Flags, candidates_of, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import IKProblem
 from kin.kernels import jacobian as jacobian_kernels
@@ -34,10 +35,14 @@ def scores(problem: IKProblem, q: Array) -> Array:
     """Score of configurations ``(k, n)`` by the preference ``(k,)``, larger is better; −∞ for NaN rows.
 
     ``limits``: the smallest distance to a joint limit, as a share of half the joint's range. ``manipulability``:
-    Yoshikawa's measure, of the linear rows if the task is a position.
+    Yoshikawa's measure, of the linear rows if the task is a position. ``nearest``: minus the distance to the seed.
     """
     out = np.full(len(q), -math.inf)
     rows = ~np.isnan(q[:, 0])
+    if problem.options.prefer == "nearest":
+        off = problem.requirement.weights * (q[rows] - problem.seed)
+        out[rows] = -np.sqrt((off * off).sum(axis=1))
+        return out
     if problem.options.prefer == "limits":
         half = 0.5 * (problem.upper - problem.lower)
         counts = np.isfinite(half) & (half > 0.0)
@@ -47,6 +52,13 @@ def scores(problem: IKProblem, q: Array) -> Array:
         J = jacobian_kernels.jacobian_many(problem.robot.model, np.ascontiguousarray(q[rows]))
         out[rows] = jacobian_kernels.manipulability_many(J, 0, 3 if problem.code == POSITION else 6)
     return out
+
+
+def searches(problem: IKProblem, branches: Branches) -> bool:
+    """Whether there may be better values than those that the solver has chosen."""
+    if problem.options.prefer != "nearest":
+        return True
+    return any(value == value for k in problem.searched for value in branches.values[:, k].tolist())  # not NaN
 
 
 def ranks(problem: IKProblem, q: Array, distance: Array) -> Array:
@@ -84,11 +96,9 @@ def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
     branches.q, branches.stats = centred(problem, branches.q)
     score = scores(problem, branches.q)
     rows = np.flatnonzero(good)
-    for k in range(len(branches.redundancies)):
-        if not math.isnan(problem.values[k]):
-            continue
+    for k in problem.searched:
         there = rows[~np.isnan(branches.values[rows, k])]
-        if len(branches.redundancies) == 1 and problem.code == POSE:
+        if len(branches.redundancies) == 1:
             _improve_together(problem, branches, score, there)
         else:
             for row in there.tolist():
@@ -153,8 +163,21 @@ def _improve_together(problem: IKProblem, branches: Branches, score: Array, rows
     for _ in range(_ZOOMS + 1):
         reached = _try_all(problem, branches, score, owner, np.minimum(values, high[:, None]))
         best = values[np.arange(len(values)), reached.argmax(axis=1)]
+        middle = values
         values = np.clip(best[:, None] + step[:, None] * np.linspace(-0.8, 0.8, 7), low[:, None], high[:, None])
         step = 0.27 * step
+    if problem.options.prefer == "nearest":  # an arm that follows is not to tremble: the top of a parabola
+        _try_all(problem, branches, score, owner, _tops(middle, reached)[:, None])
+
+
+def _tops(x: Array, y: Array) -> Array:
+    """The top ``(k,)`` of a parabola through the best of equidistant samples ``(k, m)`` and its neighbours."""
+    rows, place = np.arange(len(x)), np.clip(y.argmax(axis=1), 1, x.shape[1] - 2)
+    before, best, after = (y[rows, place + i] for i in (-1, 0, 1))
+    middle, width = x[rows, place], x[rows, place + 1] - x[rows, place]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        off = 0.5 * width * (before - after) / (before - 2.0 * best + after)
+    return np.asarray(np.where(np.abs(off) <= width, middle + off, middle))
 
 
 def _inside(low: Array, high: Array) -> tuple[Array, Array]:
@@ -170,11 +193,9 @@ def _try_all(
 
     That of NaN is −∞.
     """
-    assert problem.closed_form is not None  # whose branches these are
     tried = ~np.isnan(values)
     flat, whose = values[tried], np.broadcast_to(owner[:, None], values.shape)[tried]
-    targets = np.repeat(problem.T[None], len(flat), axis=0)  # writable: kernels are compiled for such arrays
-    q, stats = centred(problem, problem.closed_form.rows_at(targets, flat, problem.seed, whose))
+    q, stats = centred(problem, _rows_at(problem, flat, whose))
     fits = is_closed(problem, stats)
     if problem.respect:
         fits &= stats[:, OVERRUN] == 0.0
@@ -188,6 +209,20 @@ def _try_all(
     reached = np.full(values.shape, -math.inf)
     reached[tried] = found
     return reached
+
+
+def _rows_at(problem: IKProblem, values: Array, rows: NDArray[np.intp]) -> Array:
+    """One row ``(k, n)`` of the branches at each value ``(k,)`` of the only redundancy parameter."""
+    assert problem.closed_form is not None  # whose branches these are
+    if problem.code == POSE:
+        targets = np.repeat(problem.T[None], len(values), axis=0)  # writable: kernels are compiled for such arrays
+        return problem.closed_form.rows_at(targets, values, problem.seed, rows)
+    asked = values.tolist()
+    found = {
+        value: candidates_of(problem, problem.T, problem.code, None, (value,)) for value in dict.fromkeys(asked)
+    }
+    there = {value: each.q for value, each in found.items() if each is not None}
+    return np.array([there[value][row] for value, row in zip(asked, rows.tolist(), strict=True)])
 
 
 def _improve_row(problem: IKProblem, branches: Branches, score: Array, row: int, k: int) -> None:

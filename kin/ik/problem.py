@@ -15,6 +15,7 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.differential.metric import weights
 from kin.errors import InputError
 from kin.ik.candidates import Requirement, Whole
 from kin.ik.digits import EXACT, SINGLE, missing_digits
@@ -140,6 +141,7 @@ class IKProblem:
             self.lower,
             self.upper,
             self.turns,
+            weights(self.robot),
             self.code,
             self.respect,
             position,
@@ -156,6 +158,19 @@ class IKProblem:
         """Indices ``(k,)`` of the joints that may move."""
         narrow = self.respect & (self.lower >= self.upper)
         return np.flatnonzero(~(np.array(self.locked, dtype=bool) | narrow))
+
+    @cached_property
+    def searched(self) -> tuple[int, ...]:
+        """The redundancy parameters whose values are searched for the best one by the preference.
+
+        For the nearest configuration not those of a joint that moves alone, nor what depends on them, nor of seven
+        joints: their solvers compare configurations.
+        """
+        free = [k for k, value in enumerate(self.values) if math.isnan(value)]
+        if self.options.prefer == "nearest":
+            few, parameters = self.robot.n < 7, self.redundancies
+            free = [k for k in free if parameters[k].rare or (few and k == 0 and parameters[k].joint < 0)]
+        return tuple(free)
 
     @property
     def requested(self) -> tuple[RedundancyParameter, ...]:
@@ -242,7 +257,7 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
         branches=_requested_branches(robot, options, closed_form),
         unit=unit_of(robot),
     )
-    _ = problem.requirement, problem.free  # computed here, so that all copies share them
+    _ = problem.requirement, problem.free, problem.searched  # computed here, so that all copies share them
     return problem
 
 

@@ -92,7 +92,8 @@ class IKSolution(Deferred):
         rotation_error: radians; the whole angle for a pose, the angle between the approach directions for an
             approach, 0 for a position, the masked part of the rotation vector for a mask.
         in_limits: whether every joint is inside its limits.
-        distance: 2-norm of q − seed.
+        distance: 2-norm of q − seed, radians; a slide counts as a share of the arm's reach, see
+            `kin.differential.metric.weights`.
         redundancy: the redundancy parameters on this branch.
         compromise: None for an exact solution; ``"roll"``: point and approach direction are exact, the rotation
             about it is not; ``"rotation"``: the point is exact, the orientation as near as possible;

@@ -78,7 +78,8 @@ def solve_path(
         q_start: ``(n,)`` where the arm is, radians (metres). The way from there to the first waypoint counts as
             motion, but never as a jump: the path begins at its first waypoint. Without it the path may start
             anywhere; of equally good paths, the one that starts nearest to the home pose is taken.
-        max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
+        max_step: the most a joint may move between neighbouring waypoints: radians, a slide as a share of the
+            arm's reach.
         cancel: called now and then; cancels the computation by raising.
         keywords: those of `kin.solve_ik` that do not choose among the solutions of one target, for every waypoint;
             the branch ``"seed"`` is that of `q_start`.
@@ -194,7 +195,7 @@ def _chosen(settings: PathSettings, waypoints: list[Waypoint]) -> PathResult:
 
 
 def _checked_step(value: float) -> float:
-    expected = "a finite number above 0: radians, or 4 per metre"
+    expected = "a finite number above 0: radians, or a share of the arm's reach for a slide"
     number = finite_number("max_step", value, expected)
     if number <= 0.0:
         raise InputError("max_step", value, expected)

@@ -85,7 +85,7 @@ def descended(problem: IKProblem, starts: Array) -> Array:
     if problem.branches is not None:
         q = q[[problem.allows(problem.branch_of(row)) for row in q]]
     q = _free(problem, q)
-    return distinct(q, problem.seed)[:POOL]
+    return distinct(problem, q, problem.seed)[:POOL]
 
 
 def pool(problem: IKProblem) -> Array:
@@ -93,9 +93,10 @@ def pool(problem: IKProblem) -> Array:
     return descended(problem, nearest.starting_points(problem, count=POOL))
 
 
-def distinct(q: Array, near: Array) -> Array:
+def distinct(problem: IKProblem, q: Array, near: Array) -> Array:
     """The rows ``(m, n)``, each once, nearest to `near` first."""
-    kept, count = select(np.ascontiguousarray(q), np.linalg.norm(q - near, axis=1))
+    key = np.linalg.norm(problem.requirement.weights * (q - near), axis=1)
+    kept, count = select(np.ascontiguousarray(q), key)
     return np.asarray(q[kept[:count]])
 
 
@@ -176,7 +177,7 @@ def continued(
             waypoint = sequence.waypoints[s]
             found = near_solutions(settings, waypoint.problem, waypoint.relaxed, q, ahead)
             moves = settings.moves(found, q).max(axis=1)
-            found = distinct(found[moves <= most], q)
+            found = distinct(waypoint.problem, found[moves <= most], q)
             if not len(found):
                 break
             out += [(s, other) for other in found]

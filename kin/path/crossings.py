@@ -33,7 +33,7 @@ def with_crossings(sequence: LayerSequence, layers: list[Array]) -> list[Array]:
             problem, relaxed = sequence.waypoints[s].problem, sequence.waypoints[s].relaxed
             found = [near_solutions(settings, problem, relaxed, q)[:1] for q in _once(robot, out[s + neighbour])]
             more = with_images(problem, np.concatenate([out[s][:0], *found]))
-            out[s] = distinct(np.concatenate([out[s], more]), problem.seed)
+            out[s] = distinct(problem, np.concatenate([out[s], more]), problem.seed)
     return out
 
 

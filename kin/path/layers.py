@@ -127,6 +127,6 @@ def _continued_waypoints(problems: list[IKProblem]) -> list[Waypoint]:
     for requested, here in zip(reversed(problems), reversed(forth), strict=True):
         back = descended(requested, alive)
         alive = back if len(back) else here
-        layer = with_images(requested, distinct(np.concatenate([here, back]), requested.seed))
+        layer = with_images(requested, distinct(requested, np.concatenate([here, back]), requested.seed))
         out.append(Waypoint(requested, requested, layer[:_MOST_NODES]) if len(layer) else _by_answer(requested))
     return out[::-1]

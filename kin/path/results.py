@@ -23,7 +23,7 @@ class PathJump:
     Attributes:
         index: the jump is between waypoint `index` − 1 and waypoint `index`.
         joints: indices of the joints that move more than the largest step allowed.
-        step: the largest of these motions: radians, or 4 per metre for a prismatic joint.
+        step: the largest of these motions: radians, or a share of the arm's reach for a slide.
         widest: the joint that moves most, and its motion.
         cause: ``"limits"``: the motion would go on, but outside the joint limits; ``"singularity"``: at or near a
             singularity joints must turn fast; ``"branch"``: the branch being followed ends; ``"spacing"``: the

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kin.differential.metric import weights
 from kin.ik.details import JointKind
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
@@ -23,7 +24,6 @@ from kin.transforms import Array
 
 GRID = math.radians(15.0)  # step of a redundancy parameter for 60 waypoints and more; down to half for fewer
 WIDE = 2.0 * TURN + 1e-9  # a joint with more travel is followed as a circle
-_PRISMATIC_WEIGHT = 4.0  # radians that weigh as much as a metre of a prismatic joint
 _START_WEIGHT = 1e-6  # of the distance from home to the first waypoint
 
 
@@ -44,7 +44,8 @@ class PathSettings:
 
     Attributes:
         problem: limits, task, and where the arm is (its seed).
-        weight, circle: ``(n,)`` weights of the joints; 2π for a joint that is followed as a circle, else 0.
+        weight, circle: ``(n,)`` weights of the joints, see `kin.differential.metric`; 2π for a joint that is
+            followed as a circle, else 0.
         max_step: a larger weighted motion is a jump.
         start_weight: weight of the motion from the seed to the first waypoint.
         grid: radians between samples of a redundancy parameter.
@@ -63,7 +64,7 @@ class PathSettings:
         wide = ~(problem.upper - problem.lower <= WIDE)
         return cls(
             problem=problem,
-            weight=np.where(problem.robot.revolute, 1.0, _PRISMATIC_WEIGHT),
+            weight=weights(problem.robot),
             circle=np.where(problem.robot.whole_turns & wide, TURN, 0.0),
             max_step=max_step,
             start_weight=1.0 if started else _START_WEIGHT,

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.axes import size
+from kin.differential.metric import extent
 from kin.robot import Joint, Robot
 from kin.solvers.contract import (
     POSE,
@@ -36,7 +36,7 @@ _LEAST, _MOST = 0.05, 20.0  # arms of this size are solved in metres
 
 def unit_of(robot: Robot) -> float:
     """The unit of length, in metres, that an arm is solved in: 1.0 for most."""
-    length = robot.reach if math.isfinite(robot.reach) and robot.reach > 0.0 else size(robot)
+    length = extent(robot)
     return 1.0 if _LEAST <= length <= _MOST else float(2.0 ** round(math.log2(length)))
 
 

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from kin.collision.contacts import Contact
+from kin.differential.metric import weights
 from kin.ik.details import LimitViolation
 from kin.ik.messages.values import listed, need
 from kin.robot import Robot
@@ -65,7 +66,8 @@ class Way:
 
     @property
     def length(self) -> float:
-        """Sum of the lengths of its parts in joint space: radians, a metre of a sliding joint counting 4."""
+        """Sum of the lengths of its parts in joint space: radians, a slide counting as a share of the arm's
+        reach."""
         return 0.0 if self.q is None else path_length(self.robot, self.q)
 
     @property
@@ -92,11 +94,6 @@ class Way:
             case WayCause(code, _, contact):
                 touched = "" if contact is None else f": {contact.text}"
                 return f"The {code.split()[0]} touches something{touched}."
-
-
-def weights(robot: Robot) -> Array:
-    """Weights of the joints ``(n,)``: 1 per radian, 4 per metre."""
-    return np.where(robot.revolute, 1.0, 4.0)
 
 
 def path_length(robot: Robot, q: Array) -> float:

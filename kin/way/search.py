@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from kin.differential.metric import weights
 from kin.errors import InputError
 from kin.transforms import Array
 from kin.way.free import Space
-from kin.way.results import weights
 
-STEP = 0.8  # the longest motion that a tree grows by, weighted as in `kin.way.results.weights`
+STEP = 0.8  # the longest motion that a tree grows by, weighted as in `kin.differential.metric.weights`
 _ONE = threading.Lock()
 _LOOK = 0.05  # seconds between two looks whether a search that waits for another one is cancelled
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kin.differential.metric import weights
 from kin.transforms import Array
 from kin.way.free import Space
-from kin.way.results import path_length, weights
+from kin.way.results import path_length
 
 SHORTCUTS = 120
 _WORTH = 1e-3  # part of the length that a shortcut must save

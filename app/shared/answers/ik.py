@@ -42,7 +42,7 @@ class Solution(Answer):
     in_limits: bool
     """Whether every joint is inside its limits."""
     distance: float
-    """Distance from the seed in joint space (2-norm, radians)."""
+    """Distance from the seed in joint space: 2-norm, radians; a slide counts as a share of the arm's reach."""
     redundancy: list[RedundancyAnswer]
     """Redundancy parameters on this branch: the values used in this solution, and the ranges of the branch."""
     compromise: str | None

@@ -25,7 +25,7 @@ class JumpAnswer(Answer):
     joints: list[int]
     """The joints that jump, as indices into q."""
     step: float
-    """The largest of their motions, in radians (4 per metre for a sliding joint)."""
+    """The largest of their motions, in radians (of a sliding joint as a share of the arm's reach)."""
     cause: Literal["limits", "singularity", "branch", "spacing"]
     """"limits": the motion would go on, but outside the joint limits. "singularity": at or near one, joints must
     turn fast. "branch": the branch being followed ends. "spacing": the waypoints are too far apart for

@@ -33,7 +33,7 @@ class WayAnswer(Answer):
     q: Annotated[Matrix | None, From(lambda way: None if way.q is None else way.q.tolist())]
     """Waypoints from start to goal, in radians (metres); the joints move on straight lines between them."""
     length: float
-    """Sum of the lengths of its parts in joint space: radians, a metre of a sliding joint counting 4."""
+    """Sum of the lengths of its parts in joint space: radians, a slide counting as a share of the arm's reach."""
     seconds: float
     """How long the search took, shortening included."""
     seed: int

@@ -34,13 +34,12 @@ from app.viewer.scene.motion import Motion, Pace
 from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.listener import ArmListener
 from kin import Obstacle, Robot
+from kin.differential.metric import weights
 from kin.ik import Task, solve
 from kin.transforms import Array, rotation_angle, rotation_from_wxyz
 
 # A node name is never used twice: browsers keep the poses of removed nodes.
 _ARMS = itertools.count(1)
-# The motion of a prismatic joint is weighted with this many radians per metre.
-PRISMATIC_WEIGHT = 4.0
 # Random configurations that are looked at for one clear of pedestal and floor; up to 60 % of an arm's are not.
 RANDOM_DRAWS = 50
 # A target closer to the tool than this (m) gets no connecting line.
@@ -115,8 +114,7 @@ class ArmController:
         self.locks = (False,) * robot.n
         self.target = None
         self.dragging = self.playing = False
-        weights = np.where(robot.revolute, 1.0, PRISMATIC_WEIGHT)
-        self._motion = Motion(robot.q_home if q is None else q, weights)
+        self._motion = Motion(robot.q_home if q is None else q, weights(robot))
         self.q = self._motion.goal
         self.scene = ArmScene(self._client.scene, robot, dark, f"/arm-{next(_ARMS)}", drawn)
         self._in_base = self.scene.gizmo_in_base = base_axes

@@ -26,9 +26,10 @@ from ways.scenes import SCENES, Scene, ends  # noqa: E402
 
 import kin  # noqa: E402
 from kin.collision.contacts import surroundings  # noqa: E402
+from kin.differential.metric import weights  # noqa: E402
 from kin.way import find_way  # noqa: E402
 from kin.way.free import Space  # noqa: E402
-from kin.way.results import path_length, weights  # noqa: E402
+from kin.way.results import path_length  # noqa: E402
 from kin.way.search import STEP, alone  # noqa: E402
 
 ARMS = ("ur5", "panda", "iiwa14")

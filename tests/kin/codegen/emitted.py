@@ -15,6 +15,7 @@ import kin
 from kin.codegen import families, files, source
 from kin.codegen.arm import Arm, arm_of
 from kin.codegen.types import FLOAT, INT
+from kin.differential.metric import weights
 from kin.ik.candidates import Requirement, Rows, measure_and_sort
 from kin.kernels import simd
 from kin.kernels.checks import straighten
@@ -142,6 +143,7 @@ def answer(arm: Arm, T, seed, value):
     k = len(q)
     rows = Rows(q, np.empty((k, 5)), np.empty(k, bool), np.empty(k, bool), np.empty(k, np.int64))
     turns = arm.constants["turns" if math.isnan(value) else "held"]
-    requirement = Requirement(robot.model, np.zeros(7), robot.lower, robot.upper, turns, POSE, True)
+    limits = robot.lower, robot.upper, turns, weights(robot)
+    requirement = Requirement(robot.model, np.zeros(7), *limits, POSE, True)
     count = measure_and_sort(requirement, pose, seed, seed, rows)
     return count, rows

@@ -500,7 +500,6 @@ def test_few_joints_meet_what_they_can_in_a_batch_as_alone(name, task, turned):
         ("iiwa14", {"redundancy": {"psi": 0.5}}),
         ("ur5", {"task": "approach"}),
         ("so100", {"respect_limits": False}),
-        ("planar3r", {"task": "position"}),
         ("gofa", {}),
     ],
     ids=str,

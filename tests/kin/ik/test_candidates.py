@@ -80,7 +80,9 @@ def test_measuring_and_sorting_in_one_call_equals_separate_steps(respect, kernel
     T, turns = fk(arm, q[2]), np.full(arm.n, 2.0 * math.pi)
     q[0] = ik_branches(arm, T)[4]
     seed, mask = rng.uniform(arm.lower, arm.upper), np.array([1.0] * 6 + [0.0])
-    requirement = Requirement(arm.model, mask, arm.lower.copy(), arm.upper.copy(), turns, POSE, respect)
+    requirement = Requirement(
+        arm.model, mask, arm.lower.copy(), arm.upper.copy(), turns, np.ones(arm.n), POSE, respect
+    )
     rows = Rows(q.copy(), np.empty((8, 5)), np.empty(8, bool), np.empty(8, bool), np.empty(8, np.int64))
     count = kernel()(requirement, T, seed, seed, rows)
     twin, stats = q.copy(), np.empty((8, 5))
@@ -105,7 +107,7 @@ def test_accepted_rows_meet_the_task_and_the_limits():
     )
     closed, good = np.empty((2, 5), dtype=bool)
     ends = np.array([-1.0]), np.array([1.0])
-    requirement = Requirement(get_robot("puma560").model, np.ones(7), *ends, np.zeros(1), POSE, True)
+    requirement = Requirement(get_robot("puma560").model, np.ones(7), *ends, np.zeros(1), np.ones(1), POSE, True)
     assert accept(requirement, stats, True, closed, good) == 1
     assert (closed.tolist(), good.tolist()) == ([True, True, False, False, False], [True] + [False] * 4)
     assert accept(requirement, stats, False, closed, good) == 2

@@ -651,13 +651,14 @@ def test_an_arm_with_a_slide_that_fits_no_family():
     assert result.solver == "general6"
     assert result.continuous
     assert result.gaps == ()
-    # A metre of joint 3 counts as 4 radians: a slide of 0.2 m in one step is a jump.
+    # A slide counts as a share of the reach: of 0.15 m it is more than a tenth.
     far = kin.fk(robot, np.array([base, base + 0.15 * np.eye(6)[2]]))
-    (jump,) = solve_path(robot, far, q_start=base).jumps
+    (jump,) = solve_path(robot, far, q_start=base, max_step=0.1).jumps
     assert jump.joints == (2,)
-    assert jump.step == pytest.approx(0.6)
+    assert jump.step == pytest.approx(0.15 / robot.reach)
     assert jump.cause == "spacing"
-    assert "joint 3 jumps by 150.0 mm: there they are too far apart for steps of 125.0 mm" in jump.reason
+    longest = f"{100.0 * robot.reach:.1f} mm"
+    assert f"joint 3 jumps by 150.0 mm: there they are too far apart for steps of {longest}" in jump.reason
 
 
 @pytest.mark.parametrize(

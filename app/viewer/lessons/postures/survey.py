@@ -21,6 +21,7 @@ from app.viewer.scene.bodies.parts import JOINT_COLORS, Color
 from app.viewer.views.templates import render
 from kin import IKOptions, Robot
 from kin.collision import Contact
+from kin.differential.metric import weights
 from kin.ik import IKSolution, LimitViolation, solve
 from kin.ik.branches import is_closed, solve_branches, violations_of
 from kin.ik.candidates import OVERRUN
@@ -36,7 +37,6 @@ COLORS: tuple[Color, ...] = (*JOINT_COLORS[:6], (200, 180, 30), (110, 110, 110))
 BLOCKED_COLOR: Color = (150, 150, 150)
 _PROBES = 2000
 CLOSEST = "closest"  # the one posture of an arm whose branches have no names
-_SLIDE = 4.0  # rad/m: weight of prismatic joints, to compare margins of both kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +161,8 @@ def _unavailable(robot: Robot, T: Array, options: IKOptions, q: Array, units: Un
 
 def limit_margin(robot: Robot, q: Array) -> tuple[float, int]:
     """The smallest distance (rad or m) of a joint to its limit, and that joint; (inf, −1) without limits."""
-    weights = np.where(robot.revolute, 1.0, _SLIDE)
     room = np.minimum(q - robot.lower, robot.upper - q)
-    joint = int(np.argmin(room * weights))
+    joint = int(np.argmin(room * weights(robot)))
     return (float(max(room[joint], 0.0)), joint) if math.isfinite(room[joint]) else (math.inf, -1)
 
 
