@@ -125,7 +125,7 @@ class Found:
         """How many solutions there are, and what the task leaves free."""
         problem, names = self._problem, form_of(self._problem).branches
         redundancy, complete = self.redundancies()[1], is_complete(self.completeness)
-        postures = len({names[row] for row in self._order})
+        postures, multiple = len({names[row] for row in self._order}), self._multiple()
         if not redundancy and problem.options.redundancy is None:
             return Solved(
                 len(self._order),
@@ -135,6 +135,7 @@ class Found:
                 infinite=bool(self.curves),
                 postures=postures,
                 curves=self.curves,
+                multiple=multiple,
             )
         fixed = tuple([parameter.label for parameter in problem.requested])
         free = tuple([r.label for r in redundancy if r.label not in fixed and _has_width(r)])
@@ -153,7 +154,18 @@ class Found:
             free=free,
             fixed=fixed,
             complete=complete,
+            multiple=multiple,
         )
+
+    def _multiple(self) -> int:
+        """How many solutions are isolated and on several rows."""
+        if self.curves:
+            return 0
+        branches, rare = self._branches, [k for k, p in enumerate(self._branches.redundancies) if p.rare]
+        every = branches.q[self._every]
+        alone = [row for row in self._order if np.isnan(branches.values[row, rare]).all()]
+        same = (np.abs(every - branches.q[row]).max(axis=1) <= TOLERANCES.merge for row in alone)
+        return sum(int(rows.sum()) > 1 for rows in same)
 
     @property
     def singularities(self) -> tuple[Singularity, ...]:

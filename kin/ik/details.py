@@ -75,6 +75,7 @@ class Solved(NamedTuple):
         fixed: labels of those whose values were requested.
         touching: how many configurations were left out because something touches.
         curves: the curves among the configurations of a task that usually has isolated ones only.
+        multiple: how many of the configurations are multiple roots, in which several postures have merged.
     """
 
     configurations: int
@@ -87,6 +88,7 @@ class Solved(NamedTuple):
     fixed: tuple[str, ...] = ()
     touching: int = 0
     curves: tuple[SolutionCurve, ...] = ()
+    multiple: int = 0
 
 
 class Restriction(NamedTuple):

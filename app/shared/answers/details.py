@@ -134,6 +134,9 @@ class IkDetails(Answer):
     infinite: bool | UnsetType = UNSET
     """Cause "" (solved): whether there are infinitely many configurations, since the task leaves the joints a
     motion or the target is met on a curve."""
+    multiple: Annotated[int | UnsetType, From("multiple", unless_empty=True)] = UNSET
+    """Cause "" (solved): how many of the configurations are multiple roots, in which several postures have merged;
+    absent if none are."""
     branch: str | UnsetType = UNSET
     """Cause "joint limits": the posture that is closest to the limits. Causes "self-collision" and "obstacle": the
     one with the fewest contacts."""

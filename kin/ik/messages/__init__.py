@@ -221,7 +221,13 @@ def _counted(details: Solved, task: str) -> str:
     text = count(details.configurations, "configuration", "configurations")
     if details.fixed:
         target += f" and the requested {listed(details.fixed)}"
-    return f"{text}{target}" if details.complete else f"{text} found{target}; others may exist"
+    text = f"{text}{target}" if details.complete else f"{text} found{target}; others may exist"
+    if not details.multiple:
+        return text
+    which = "it is" if details.configurations == 1 else count(details.multiple, "of them is", "of them are")
+    return (
+        f"{text}; {which} {'a multiple root' if details.multiple == 1 else 'multiple roots'}, where postures merge"
+    )
 
 
 def _while(restriction: Restriction | None) -> str:

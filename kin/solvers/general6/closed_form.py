@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kin.axes import is_along, is_zero, links_of, screw_x, screw_z, size
+from kin.axes import is_along, is_zero, links_of, screw_x, screw_z
+from kin.differential.metric import extent
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
@@ -99,19 +100,14 @@ def match(robot: Robot) -> General6 | None:
 def _poses(robot: Robot) -> tuple[Array, Array]:
     """Random configurations, and their poses."""
     q = np.random.default_rng(6).uniform(-math.pi, math.pi, (_POSES, 6))
-    q[:, ~robot.revolute] *= _size(robot) / math.pi
+    q[:, ~robot.revolute] *= extent(robot) / math.pi
     return q, fk(robot, q)
-
-
-def _size(robot: Robot) -> float:
-    """The reach of an arm, or something like it if a slide has no limits, metres."""
-    return robot.reach if 0.0 < robot.reach < math.inf else size(robot)
 
 
 def moves_freely(robot: Robot) -> bool:
     """Whether an arm with six joints can move its tool in every direction."""
     J = jacobian(robot, np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6)))
-    J[:, :3, robot.revolute] /= _size(robot)
+    J[:, :3, robot.revolute] /= extent(robot)
     return int(np.linalg.matrix_rank(J, rtol=_REGULAR).max()) == 6
 
 
@@ -200,25 +196,25 @@ class General6(ClosedForm):
         return Candidates(out, values, tuple(ranges), completeness=completeness)
 
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
-        """q ``(16, 6)`` ← all solutions, a multiple one once; how it is known that these are all."""
+        """q ``(16, 6)`` ← all solutions, copies of a multiple one alike; how it is known that these are all."""
         known = self._all(T, near, q)
         if known != "proved":
             self._merge_copies(T, q)
         return known
 
     def _merge_copies(self, T: Array, q: Array) -> None:
-        """Leave one of the copies into which rounding splits a multiple solution, of q ``(16, 6)``, in place.
+        """Make the copies into which rounding splits a multiple solution of q ``(16, 6)`` one, in place.
 
         What is between two copies meets the target as well as they do; between two solutions nothing does.
         """
         rows = np.flatnonzero(~np.isnan(q[:, 0])).tolist()
         for k, i in enumerate(rows):
-            close = [j for j in rows[:k] if not math.isnan(q[j, 0]) and _apart(self.robot, q[j], q[i]) < _COPIES]
+            close = [j for j in rows[:k] if _apart(self.robot, q[j], q[i]) < _COPIES]
             off = q[close] - q[i]
             off = np.where(self.robot.revolute, (off + math.pi) % TURN - math.pi, off)
             miss = np.abs(fk(self.robot, q[i] + 0.5 * off) - T).max(axis=(1, 2), initial=0.0)
             if (miss < TOLERANCES.closure_position).any():
-                q[i] = math.nan
+                q[i] = q[close[int(miss.argmin())]]
 
     def _all(self, T: Array, near: Array, q: Array) -> Completeness:
         """`add_missing`, with the copies of multiple solutions."""
@@ -248,7 +244,7 @@ class General6(ClosedForm):
         rows = self._thinned(T, np.concatenate([self._descended(T, near[None]), q[~np.isnan(q[:, 0])]]))
         close = [self._near_target(T, step) for step in _STEPS]
         starts = np.random.default_rng(8).uniform(-math.pi, math.pi, (2, _STARTS, 6))
-        starts[..., ~self.robot.revolute] *= _size(self.robot) / math.pi
+        starts[..., ~self.robot.revolute] *= extent(self.robot) / math.pi
         for each in (np.concatenate(close), *starts):
             before = len(rows)
             rows = self._thinned(T, np.concatenate([rows, self._descended(T, each)]))
@@ -273,7 +269,7 @@ class General6(ClosedForm):
     def _folds(self, q: Array) -> Array:
         """The smallest singular value ``(k,)`` at each configuration, lengths in shares of the reach."""
         J = jacobian(self.robot, q)
-        J[:, :3, self.robot.revolute] /= _size(self.robot)
+        J[:, :3, self.robot.revolute] /= extent(self.robot)
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
 
     def _add_nearby(self, T: Array, q: Array) -> bool:
@@ -308,7 +304,7 @@ class General6(ClosedForm):
     def _near_target(self, T: Array, step: Array) -> Array:
         """The solutions ``(k, 6)`` of a target close by."""
         moved, rows = T @ step, np.empty((SOLUTIONS, 6))
-        moved[:3, 3] = T[:3, 3] + _size(self.robot) * step[:3, 3]
+        moved[:3, 3] = T[:3, 3] + extent(self.robot) * step[:3, 3]
         self._solve_all(moved, rows)
         return rows[~np.isnan(rows[:, 0])]
 

@@ -735,6 +735,32 @@ def test_an_answer_says_whether_its_solutions_are_all(name, options, complete, s
 
 
 @pytest.mark.parametrize(
+    ("name", "q", "multiple", "said"),
+    [
+        (
+            "planar2r",
+            (0.3, 0.0),
+            1,
+            "one configuration for this pose; it is a multiple root, where postures merge.",
+        ),
+        ("planar2r", (0.3, 0.4), 0, "one configuration for this pose."),
+        (
+            "ur5",
+            (0.1, -0.7, 0.0, 0.4, 0.8, 0.2),
+            1,
+            "5 configurations for this pose; one of them is a multiple root",
+        ),
+        ("ur5", (0.1, -0.7, 0.9, 0.4, 0.0, 0.2), 0, "infinitely many"),
+    ],
+)
+def test_a_multiple_root_is_said(name, q, multiple, said):
+    robot = kin.get_robot(name)
+    result = solve_ik(robot, kin.fk(robot, q), q_seed=q, respect_limits=False)
+    assert result.details.multiple == multiple
+    assert said in result.reason
+
+
+@pytest.mark.parametrize(
     ("name", "options", "said"),
     [
         ("puma560", {"task": "position"}, "Reached: infinitely many configurations for this point; 3 were found."),
