@@ -25,6 +25,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.general5.completion import BALL, COMPLETIONS, ROLL, Axes, completed
+from kin.solvers.general5.point import Point3
 from kin.solvers.general6.closed_form import moves_freely
 from kin.solvers.reversed import WrappedKernels
 from kin.solvers.rolled import roll_sense
@@ -34,29 +35,32 @@ from kin.transforms import Array
 
 NAME = "general5"
 TITLE = "all solutions, three to five joints"
-# Orientations in no special position.
-_TURNS = tuple(
-    (screw_z(a, 0.0) @ screw_x(0.0, b) @ screw_z(c, 0.0))[:3, :3]
-    for a, b, c in ((0.4, 1.2, -2.2), (1.4, 0.9, -0.2))
-)
-_POINTS = 4  # the most configurations of three joints for a point
+_TURN = (screw_z(0.4, 0.0) @ screw_x(0.0, 1.2) @ screw_z(-2.2, 0.0))[:3, :3]  # in no special position
 _AT_ZERO = TOLERANCES.near_miss
 _CHUNK = 256  # targets whose solutions are compared at a time
 
 
-def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General5 | None:
-    """The solver, if virtual joints make the arm one with a solver.
+Match = Callable[[Robot], ClosedForm | None]
 
-    `form_of` gives the solver of an arm with six joints.
+
+def match(robot: Robot, form_of: Match, family_of: Match) -> General5 | Point3 | None:
+    """The solver, if virtual joints make the arm one with a solver, or the point moves in every direction.
+
+    Args:
+        form_of: gives the solver of an arm with six joints.
+        family_of: gives it only if the arm fits a family.
     """
     for axes in COMPLETIONS.get(robot.n, ()):
         if robot.revolute.all() and robot.n == 3 and axes is not BALL:
             continue  # planar arms have a family
         longer = completed(robot, axes)
-        # Where the completed arm can barely move in some direction, solutions would be lost.
-        form = form_of(longer) if moves_freely(longer) else None
+        if not moves_freely(longer):
+            continue  # where it can barely move in some direction, solutions would be lost
+        form = (family_of if axes is BALL else form_of)(longer)
         if form is not None:
             return General5(robot, form, axes)
+        if axes is BALL:
+            return Point3(robot)
     return None
 
 
@@ -77,8 +81,7 @@ class General5(ClosedForm):
         self.reason = f"{robot.n} {kind} whose axes fit no closed form; with {virtual} at the tool: {form.name}"
         # Names belong to all solutions of the six joints; for a point, the last part is about the virtual joints.
         self.named = form.named and not self._last_rolls
-        self._pairs = self._point and form.named
-        if self._pairs:
+        if self._point:
             self.branches = tuple(name.rpartition(" · ")[0] for name in form.branches[::2])
             known = {part for name in self.branches for part in name.split(" · ")}
             self.meanings = tuple(meaning for meaning in form.meanings if meaning[0] in known)
@@ -86,8 +89,7 @@ class General5(ClosedForm):
             self.branches, self.meanings = form.branches, form.meanings
         else:
             self.named = False
-            count = _POINTS if self._point else len(form.branches)
-            self.branches = tuple(f"solution {i + 1}" for i in range(count))
+            self.branches = tuple(f"solution {i + 1}" for i in range(len(form.branches)))
         self.kernels = self._kernels(form.kernels)
 
     def handles(self, task: int) -> bool:
@@ -107,16 +109,11 @@ class General5(ClosedForm):
     def solve(self, problem: SolverInput) -> Candidates:
         """All solutions that meet what the arm can meet of the target."""
         p, n = problem, self.robot.n
-        if self._point and not self._pairs:
-            q = np.empty((len(self.branches), n))
-            self.kernels.one(self.kernels.params, p.T, math.nan, p.seed, q)
-            missing = bool(np.isnan(q).all())
-            return Candidates(q, np.empty((len(q), 0)), (), 0.0, Obstacle("point") if missing else None)
         free_roll = p.task == APPROACH and self._last_rolls
         T, lower, upper = without_last(p) if free_roll else (p.T, p.lower, p.upper)
         if self._point:
             T = T.copy()
-            T[:3, :3] = _TURNS[0]
+            T[:3, :3] = _TURN
         virtual = np.zeros(6 - n)
         own = self.form.redundancies(POSE)
         kept = [k for k, r in enumerate(own) if r.joint < n]
@@ -151,17 +148,9 @@ class General5(ClosedForm):
         """The solution of the six joints, q ``(N, k, 6)``, that each row ``(N, b)`` takes; −1 for none."""
         there = ~np.isnan(q[:, :, 0])
         numbers = np.broadcast_to(np.arange(q.shape[1]), there.shape)
-        if self._pairs:
+        if self._point:
             first = np.where(there[:, ::2], numbers[:, ::2], numbers[:, 1::2])
             return np.where(there[:, ::2] | there[:, 1::2], first, -1)
-        if self._point:
-            own = np.where(there[:, :, None], q[:, :, :3], math.inf)
-            with np.errstate(invalid="ignore"):
-                gap = self._gaps(own[:, :, None] - own[:, None]).max(axis=3)
-            again = np.tril(gap < TOLERANCES.merge, -1).any(axis=2)
-            there = there & ~again
-            order = np.argsort(~there, axis=1, kind="stable")[:, :_POINTS]
-            return np.where(np.take_along_axis(there, order, axis=1), order, -1)
         if not self._rolls:
             off = np.abs((q[:, :, self.robot.n :] + math.pi) % TURN - math.pi).max(axis=2)
             there = there & (off < _AT_ZERO)
@@ -202,35 +191,19 @@ class General5(ClosedForm):
         return WrappedKernels(form.params, one, many, self._kernels, form)
 
     def _completed(self, form: BatchKernels, params: Array, T: Array, values: Array, near: Array) -> Array:
-        """Solutions of the six joints ``(N, k, 6)``.
-
-        Those of a point come in pairs, but for double ones: with an odd number, or none, another orientation is
-        asked for as well.
-        """
+        """Solutions of the six joints ``(N, k, 6)``."""
         found = np.empty((len(T), len(self.form.branches), 6))
-        if not self._point:
-            form.many(params, T, values, near, found)
-            return found
-        T = T.copy()
-        T[:, :3, :3] = _TURNS[0]
+        if self._point:
+            T = T.copy()
+            T[:, :3, :3] = _TURN
         form.many(params, T, values, near, found)
-        if self._pairs:
-            return found
-        count = (self._rows(found) >= 0).sum(axis=1)
-        odd = np.flatnonzero((count % 2 == 1) | (count == 0))
-        more = np.full_like(found, math.nan)
-        if len(odd):
-            T[odd, :3, :3] = _TURNS[1]
-            again = np.empty((len(odd), *found.shape[1:]))
-            form.many(params, np.ascontiguousarray(T[odd]), np.array([math.nan]), near, again)
-            more[odd] = again
-        return np.concatenate([found, more], axis=1)
+        return found
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(n,)`` among all solutions of its pose."""
         if self.named:
             row = self.form.branch_of(np.append(q, np.zeros(6 - self.robot.n)))
-            return row // 2 if self._pairs else row
+            return row // 2 if self._point else row
         out = np.empty((len(self.branches), self.robot.n))
         self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, np.asarray(q), out)
         apart = self._gaps(out - q).max(axis=1)

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kin.axes import inverse, is_zero, screw_x, screw_z, size
+from kin.axes import inverse, is_zero, screw_x, screw_z
+from kin.differential.metric import extent
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
@@ -26,11 +27,11 @@ COMPLETIONS: dict[int, tuple[Axes, ...]] = {3: (BALL, _ANY), 4: (_ANY[:2],), 5: 
 
 def completed(robot: Robot, axes: Axes) -> Robot:
     """The arm with virtual joints about these axes."""
-    extent = robot.reach if math.isfinite(robot.reach) else size(robot)
+    reach = extent(robot)
     frame, rows, tool = np.eye(4), list(robot.rows), robot.T_last_tool
     for k, (direction, place) in enumerate(axes):
         z = tool[:3, :3] @ np.asarray(direction) / np.linalg.norm(direction)
-        point = tool[:3, 3] + extent * (tool[:3, :3] @ np.asarray(place))
+        point = tool[:3, 3] + reach * (tool[:3, :3] @ np.asarray(place))
         theta, d, a, alpha = link_to(inverse(frame), z, point)
         frame = frame @ screw_z(theta, d) @ screw_x(a, alpha)
         name = f"virtual {k + 1}"

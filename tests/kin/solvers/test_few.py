@@ -30,6 +30,7 @@ import kin
 from kin import Status
 from kin.axes import screw_x, screw_z
 from kin.solvers import closed_form_of
+from kin.solvers.general5 import General5
 from kin.transforms import rotation_angle
 
 FEW = (*PITCH, *GENERAL)
@@ -228,6 +229,38 @@ def test_a_point_has_up_to_four_postures_of_three_joints():
     assert counts == {2, 4}
     far = kin.solve_ik(SPATIAL3, (5.0, 0.0, 0.0), task="position")
     assert (far.status, far.cause) == (Status.UNREACHABLE, "too far")
+
+
+@pytest.mark.parametrize("alpha", [1.57, 1.5708, 1.1])
+@pytest.mark.parametrize("sliding", [(), (2,), (0,), (0, 1)], ids=str)
+def test_three_joints_in_no_family_are_solved_as_three(alpha, sliding):
+    """With virtual joints, nearly special axes would make six joints that take half a minute to match."""
+    robot = slides(
+        arm(f"typed-{alpha}", (0.2, 0.3, 0.1, alpha), (0, 0.05, 0.3, alpha), (0, 0.1, 0.2, 0)), *sliding
+    )
+    form = closed_form_of(robot)
+    assert not isinstance(form, General5) or form.form.named
+    for q in robot.random_q(np.random.default_rng(6), 10):
+        result = kin.solve_ik(robot, kin.fk(robot, q)[:3, 3], task="position")
+        assert result.complete
+        assert min(moved(s.q, q, robot) for s in result.solutions) < 1e-6
+    far = kin.solve_ik(robot, (9.0, 0.0, 0.0), task="position")
+    assert far.status in (Status.UNREACHABLE, Status.LIMITS)
+
+
+def test_a_point_on_axis_1_keeps_joint_1_of_the_seed():
+    """The polynomial vanishes there: joint 1 is free."""
+    robot = arm("on-axis", (0, 0.2, 0.3, 1.1), (0, 0.1, 0.3, -0.8), (0, 0.1, 0.25, 0))
+    q = next(
+        q for q in robot.random_q(np.random.default_rng(7), 2000) if np.hypot(*kin.fk(robot, q)[:2, 3]) < 0.02
+    )
+    for _ in range(20):  # Newton steps of joints 2 and 3 to the axis
+        J, point = kin.jacobian(robot, q)[:2, 1:], kin.fk(robot, q)[:2, 3]
+        q = q - np.append(0.0, np.linalg.solve(J, point))
+    turned_first = np.array([0.7, 0.0, 0.0])
+    found = kin.solve_ik(robot, kin.fk(robot, q)[:3, 3], task="position", q_seed=q + turned_first)
+    assert not found.complete
+    np.testing.assert_allclose(found.best.q, q + turned_first, atol=1e-6)
 
 
 def test_reversed_joints_and_the_other_convention_change_nothing():
