@@ -30,7 +30,6 @@ from kin.ik.batch import solve_ik_many
 from kin.ik.candidates import unchecked
 from kin.ik.table import Table
 from kin.kernels.cache import is_cached
-from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import path_postures, solve_path
 from kin.robot import Robot
@@ -80,8 +79,9 @@ def warm_up(everything: bool = False) -> None:
             that takes minutes.
     """
     first, *others = one_of_each_family()
+    there = compiled()
     _move(first)
-    if not solve.stats.cache_hits:  # type: ignore[attr-defined] # a dispatcher; kin.fk alone does not compile it
+    if not there:
         for robot in others:
             _move(robot)
         for robot in (first, *others):
@@ -108,8 +108,11 @@ def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = 
 
 
 def compiled() -> bool:
-    """Whether the kernels of `warm_up_first` are in the cache, judged by one of them; True without a cache."""
-    return is_cached(fk_one)
+    """Whether the kernels of `warm_up_first` are in the cache, judged by its solver's; True without a cache.
+
+    Others are there too where only `kin.fk` has been called.
+    """
+    return is_cached(solve)
 
 
 def rest_compiled() -> bool:
