@@ -47,7 +47,9 @@ def scaled(robot, by):
 
 
 def known(result):
-    return result.status, result.cause, result.completeness, [s.branch for s in result.solutions]
+    """What is the same. Solutions without names are numbered as roots, in an order that rounding decides."""
+    names = [s.branch if " · " in s.branch else "" for s in result.solutions]
+    return result.status, result.cause, result.completeness, names
 
 
 def check_scaled(name, by, count):
@@ -62,7 +64,8 @@ def check_scaled(name, by, count):
         a, b = kin.solve_ik(robot, T, q_seed=seed), kin.solve_ik(other, small, q_seed=seed * factors)
         assert known(a) == known(b)
         for one, two in zip(a.solutions, b.solutions, strict=True):
-            np.testing.assert_allclose(two.q / factors, one.q, atol=2e-6)
+            # The nearest value of a redundancy parameter is that of a flat minimum.
+            np.testing.assert_allclose(two.q / factors, one.q, atol=2e-5 if one.redundancy else 2e-6)
             assert two.position_error <= 1e-9 * by
         assert [r.name for r in a.redundancy] == [r.name for r in b.redundancy]
         assert [len(r.intervals) for r in a.redundancy] == [len(r.intervals) for r in b.redundancy]
