@@ -24,27 +24,26 @@ class RobotFormat:
     media_type: str
 
 
-FORMATS = {
-    "toml": RobotFormat("a robot file", ".toml", "application/toml"),
-    "urdf": RobotFormat("URDF without bodies", ".urdf", "application/xml"),
-    "mjcf": RobotFormat("MJCF for MuJoCo, with capsules and assumed masses", ".xml", "application/xml"),
-    "dh": RobotFormat("a robot file in the standard convention", "-standard.toml", "application/toml"),
-    "mdh": RobotFormat("a robot file in the modified convention", "-modified.toml", "application/toml"),
+# In these, identifiers begin with a name; files of one arm include each other.
+SOURCES = {
     "c": RobotFormat("source of forward and inverse kinematics in C99", ".c", "text/x-c"),
     "js": RobotFormat("the same in JavaScript, a script", ".js", "text/javascript"),
     "mjs": RobotFormat("the same as an ES module", ".mjs", "text/javascript"),
     "d.ts": RobotFormat("the types of that module", ".d.ts", "text/plain"),
     "c-test": RobotFormat("a C file that checks the one in C99", "_test.c", "text/x-c"),
 }
-
-
-SOURCES = ("c", "js", "mjs", "d.ts", "c-test")
+FORMATS = {
+    "toml": RobotFormat("a robot file", ".toml", "application/toml"),
+    "urdf": RobotFormat("URDF without bodies", ".urdf", "application/xml"),
+    "mjcf": RobotFormat("MJCF for MuJoCo, with capsules and assumed masses", ".xml", "application/xml"),
+    "dh": RobotFormat("a robot file in the standard convention", "-standard.toml", "application/toml"),
+    "mdh": RobotFormat("a robot file in the modified convention", "-modified.toml", "application/toml"),
+    **SOURCES,
+}
 
 
 def file_name(robot: Robot, name: str, begins: str | None = None) -> str:
     """The name of a file in one of `FORMATS`.
-
-    Source is named as the identifiers in it, because files of one arm include each other.
 
     Args:
         name: the format.
