@@ -177,7 +177,9 @@ class Tab:
 
     def type_number(self, label: str, text: str) -> None:
         entry = self.row(label).locator("input:visible").last
-        entry.fill(text)
+        entry.focus()
+        while entry.input_value() != text:  # a value that comes while all is selected takes the selection away
+            entry.fill(text)
         entry.press("Enter")
 
     def open(self, title: str) -> None:
