@@ -3,8 +3,8 @@
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
 arm are; all others are compiled after that, part by part (:mod:`app.shared.preparation`). Other processes compile
-(:mod:`app.service.compiler`): two of them the kernels of the first arm, one the others, and one what a request
-needs before its turn. The processes that compute for REST load what is compiled.
+(:mod:`app.service.compiler`): two of them, on one processor one, the kernels of the first arm, one the others, and
+one what a request needs before its turn. The processes that compute for REST load what is compiled.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from app.service.compute.child import load_first, load_rest
 from app.service.compute.pool import Pool
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.preparation import Preparation
-from app.shared.threads import lower_priority
+from app.shared.threads import lower_priority, processors
 from kin.kernels.elsewhere import compile_elsewhere
 from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
 
@@ -96,7 +96,7 @@ class Startup:
             self._start_viewer()
             if not (compiled() or self._stopping.is_set()):
                 with ThreadPoolExecutor(2, "kinboard-warm-up") as threads:
-                    list(threads.map(self._warm_up_first, (False, True)))
+                    list(threads.map(self._warm_up_first, (False, True)[: processors()]))
             if not self._stopping.is_set():
                 warm_up_first()
                 if self._pool is not None:

@@ -94,6 +94,7 @@ def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monke
     monkeypatch.setattr(app.service.startup, "compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "rest_compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "warm_up_first", warm_up_first)
+    monkeypatch.setattr(app.service.startup, "processors", lambda: 2)
     missing = {name: (lambda: compilers.compile(rest),) for name in parts()}
     monkeypatch.setattr(app.shared.preparation, "parts", lambda: missing)
     with TestClient(service) as client:
