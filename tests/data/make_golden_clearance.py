@@ -81,7 +81,7 @@ def main() -> None:
     rng = np.random.default_rng(5)
     many = int(sys.argv[1]) if sys.argv[1:] else 0
     alone, among = {}, {}
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         if len(bodies_of(robot).pairs):
             alone[robot.id] = compared(robot, robot.random_q(rng, many or 12))
         among[robot.id] = compared(robot, robot.random_q(rng, many or 12), OBSTACLES)

@@ -185,8 +185,5 @@ def test_bad_arguments_are_named(words, field):
 
 
 def test_links_may_touch_each_other_unless_that_is_avoided_here_as_elsewhere():
-    for function in (kin.way.find_way, kin.way.way_program):
-        assert (
-            signature(function).parameters["avoid_self_collision"].default is kin.IKOptions().avoid_self_collision
-        )
-    assert not kin.IKOptions().avoid_self_collision
+    functions = (kin.IKOptions, kin.way.find_way, kin.way.way_program)
+    assert {signature(f).parameters["avoid_self_collision"].default for f in functions} == {False}
