@@ -225,7 +225,7 @@ def test_a_mistake_in_the_table_of_the_ur5_is_named(change: Callable[[Robot], Ro
 def test_two_mistakes_are_both_named():
     a = kin.get_robot("ur5")
     b = changed(changed(a, 3, alpha=-a.rows[3].alpha), 1, a=-0.4)
-    found = kin.compare(a, b)
+    found = kin.compare(a, b, seconds=60.0)
     assert {each.mistake for each in found.explanations[0].changes} == {"sign", "value"}
     assert found.complete
 
@@ -242,7 +242,7 @@ def test_the_time_limit_is_admitted_for_rows_left_out():
     """With no time, a second row is not even looked for; with some, both are found."""
     a = kin.get_robot("panda")
     b = replace(a, rows=a.rows[:2] + a.rows[4:], home=a.home[:2] + a.home[4:])
-    found = kin.compare(a, b)
+    found = kin.compare(a, b, seconds=60.0)
     assert [each.mistake for each in found.explanations[0].changes] == ["missing row", "missing row"]
     assert found.complete
     assert not kin.compare(a, b, seconds=0.0).complete
