@@ -325,7 +325,7 @@ PRIVATE = 223  # uses of others' private names in tests
 IMPORTANT = 93  # in style sheets: most override what viser or Mantine writes into the style of an element
 # Private fields that features change, by class; none of all others.
 FIELDS = {
-    "Capability": 3,
+    "Capability": 2,
     "CourseFeature": 2,
     "Guide": 7,
     "Member": 6,
@@ -334,7 +334,7 @@ FIELDS = {
     "ProgramTab": 13,
     "RobotTab": 6,
     "Screen": 9,
-    "Workspace": 12,
+    "Workspace": 2,
 }
 FEATURE = re.compile(r"(Feature|Lesson|Screen)\b")
 NOT_PRIVATE = {"_replace", "_asdict", "_fields", "_make", "_repr_html_"}  # of named tuples and IPython
@@ -370,7 +370,7 @@ def fields_of_features(sources: Sources) -> Iterator[str]:
         classes = (node for node in ast.walk(tree(source)) if isinstance(node, ast.ClassDef))
         for one in (each for each in classes if any(FEATURE.search(ast.unparse(base)) for base in each.bases)):
             methods = (node for node in one.body if isinstance(node, FunctionDef))
-            changing = (each for each in methods if each.name not in ("__init__", "started"))
+            changing = (each for each in methods if each.name not in ("__init__", "built", "started"))
             stored = (node for method in changing for node in ast.walk(method) if isinstance(node, ast.Attribute))
             names = {
                 node.attr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +10,7 @@ import viser
 from app.exports.svg import tick_labels
 from app.viewer.labels import add_label
 from app.viewer.scene.floor import INK_DARK, INK_LIGHT
+from app.viewer.tabs.workspace.roots import new_root
 from kin import Robot
 from kin.transforms import Array
 from kin.units import Units
@@ -36,12 +36,10 @@ class Axes:
         corners: the ends of the axes and the places of their titles ``(n, 3)``; None: no axes are shown.
 
     Args:
-        new_root: returns a prefix of node names that was never used before.
     """
 
-    def __init__(self, scene: viser.SceneApi, new_root: Callable[[], str]) -> None:
+    def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
-        self._new_root = new_root
         self._top: viser.FrameHandle | None = None
         self._shown: tuple[Robot, Units, bool] | None = None
         self.corners: Array | None = None
@@ -63,7 +61,7 @@ class Axes:
         self._top = self._shown = self.corners = None
 
     def _draw(self, low: Array, high: Array, units: Units, ink: tuple[int, int, int]) -> None:
-        root, scene, unit = self._new_root(), self._scene, units.lengths
+        root, scene, unit = new_root(), self._scene, units.lengths
         self._top = scene.add_frame(root, show_axes=False)
         size = float((high - low).max())
         segments, titles = [], []

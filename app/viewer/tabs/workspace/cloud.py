@@ -20,6 +20,7 @@ from app.viewer.scene.motion import FRAME
 from app.viewer.tabs.workspace import colours, views
 from app.viewer.tabs.workspace.cloud_nodes import CloudNodes, Look
 from app.viewer.tabs.workspace.cut import Cut
+from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
@@ -35,7 +36,6 @@ class CloudView:
     """The clouds in one visitor's scene. Not thread-safe: the visitor's worker calls it.
 
     Args:
-        new_root: returns a prefix of node names that was never used before.
         wake: called from any thread when there may be something to do.
 
     Attributes:
@@ -49,7 +49,6 @@ class CloudView:
         said: Said,
         settings: WorkspaceSettings,
         window: SendWindow,
-        new_root: Callable[[], str],
         wake: Callable[[], None],
     ) -> None:
         self.settings = settings
@@ -57,7 +56,6 @@ class CloudView:
         self._stage = stage
         self._said = said
         self._window = window
-        self._new_root = new_root
         self._wake = wake
         self._running = self._stopped = self._grey = False
         self._cut: Cut | None = None
@@ -150,7 +148,7 @@ class CloudView:
             cloud,
             self._look(which),
             self.settings.size,
-            self._new_root(),
+            new_root(),
             self._wake,
         )
         nodes.show(self._slabs)

@@ -24,6 +24,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.tabs.workspace import views
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.cloud_nodes import CloudNodes
+from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
 from kin import InputError
 from kin.transforms import Array, finite_array
@@ -61,13 +62,11 @@ class PointPicker:
     Posts ``"click"`` and ``"picked"`` to itself; `post` returns them.
 
     Args:
-        new_root: returns a node name that was never used before.
     """
 
-    def __init__(self, stage: Stage, said: Said, new_root: Callable[[], str], post: Post) -> None:
+    def __init__(self, stage: Stage, said: Said, post: Post) -> None:
         self._stage = stage
         self._said = said
-        self._new_root = new_root
         self._post = post
         self._searches = 0  # number of the newest search; older ones stop
         self._mark: viser.IcosphereHandle | None = None
@@ -134,7 +133,7 @@ class PointPicker:
         self._remove_mark()
         radius = max(1.2 * size, 0.008 * cloud.robot.reach)
         self._mark = self._stage.client.scene.add_icosphere(
-            self._new_root(), radius=radius, color=MARK_COLOUR, position=point
+            new_root(), radius=radius, color=MARK_COLOUR, position=point
         )
         self._picked = (cloud, found.index, q, point)
         self.refresh()

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-import kin
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Html, Node
@@ -27,6 +26,7 @@ from app.viewer.tabs.workspace.cloud import CloudView
 from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import PointPicker
+from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
 from app.viewer.tabs.workspace.send_window import SendWindow
@@ -57,23 +57,12 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def built(self) -> None:
         stage = self.stage
         window = SendWindow(stage.client, lambda: self.post("more"))
-        self._roots = 0
-        self._clouds = CloudView(
-            stage, self._said, self.settings, window, self._new_root, lambda: self.post("more")
-        )
-        self._picker = PointPicker(stage, self._said, self._new_root, self.post)
+        self._clouds = CloudView(stage, self._said, self.settings, window, lambda: self.post("more"))
+        self._picker = PointPicker(stage, self._said, self.post)
         self._section: SectionPanel | None = None
-        self._axes = Axes(stage.client.scene, self._new_root)
-        self._plotted = self._dotted = self._moved = 0.0
-        self._tool = stage.now.T_tool[:3, 3]
-        self._dot_due = False
-        self._capability = Capability(
-            stage,
-            window,
-            self._post_capability,
-            self._new_root,
-            self._open_map,
-        )
+        self._axes = Axes(stage.client.scene)
+        self._moved = 0.0  # when the arm did last
+        self._capability = Capability(stage, window, self._post_capability, self._open_map)
         self._capability.use_look(self.settings.map, None, None)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
@@ -124,22 +113,26 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
                 Work("extent", lambda arm: stage.summaries.facts(arm, effort=None), (robot,)),
                 Work("sizes", stage.summaries.facts, (robot,)),
             ]
-        if self.settings.section:
+        if (plot := self._section) is not None:
             works += [
-                Work("section", lambda arm, _: subscribe_section(stage.summaries, arm), (robot, self._section)),
-                Work(
-                    "outline", lambda arm, _: subscribe_section(stage.summaries, arm, True), (robot, self._section)
-                ),
+                Work("section", lambda arm, _: subscribe_section(stage.summaries, arm), (robot, plot)),
+                Work("outline", lambda arm, _: subscribe_section(stage.summaries, arm, True), (robot, plot)),
+                Work("dot", lambda tool, _: plot.tool_at(tool), (self.facts.T[:3, 3], plot), pace=DOT, keep=True),
             ]
+            for nodes in self._clouds.nodes[:1]:
+                found = self.facts.work("section").finished
+                counted = nodes.cloud, nodes.parts, plot.plotting, found
+                redraw = REDRAW if self._clouds.busy else 0.0
+                works.append(Work("plot", lambda cloud, parts, *_: plot.count(cloud, parts), counted, pace=redraw))
         return works
 
     def worked(self, key: str) -> None:
         super().worked(key)
         found, section = self.facts.work(key).value, self._section
         if section is not None and key == "section":
-            section.take(found, self._tool)
+            section.take(found, self.stage.now.T_tool[:3, 3])
         elif section is not None and key == "outline":
-            section.take_outline(found, self._tool)
+            section.take_outline(found, self.stage.now.T_tool[:3, 3])
 
     # Events
 
@@ -160,7 +153,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._clear()
         self._capability.on_robot()
         robot = self.stage.now.robot
-        self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._use(self.settings.for_robot(robot))
         self._set_cut()
         if self._section is not None:
@@ -189,17 +181,13 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._moved = time.perf_counter()
-        if self._section is None:
-            return
-        self._tool = T_base_tool[:3, 3]
-        self._section.turn(self._tool)
-        self._dot_due = True
-        self.due = min(self.due, DOT) if self.due is not None else DOT
+        if self._section is not None:
+            self._section.turn(T_base_tool[:3, 3])
+            self.due = min(self.due, DOT) if self.due is not None else DOT
 
     def tick(self, now: float) -> None:
         moving = now - self._moved < MOVED
         self._clouds.advance(now, moving)
-        self._update_section(now)
         try:
             self._capability.poll(now, moving)
             if self.settings.opened and self._capability.empty:
@@ -208,9 +196,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         finally:
             self.schedule()
             super().tick(now)
-            cloud_due = DOT if self._dot_due else self._clouds.next_tick(now, moving)
-            times = [due for due in (self.due, cloud_due, self._capability.due) if due is not None]
-            self.due = min(times, default=None)
+            times = self.due, self._clouds.next_tick(now, moving), self._capability.due
+            self.due = min((due for due in times if due is not None), default=None)
 
     def state(self) -> dict[str, object]:
         drawn = bool(self._clouds.nodes)
@@ -353,11 +340,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         if self._clouds.nodes:
             self._picker.search(ray, self._clouds.nodes[0], self.settings.size)
 
-    def _new_root(self) -> str:
-        """A prefix of node names that was never used before."""
-        self._roots += 1
-        return f"/workspace-{self._roots}"
-
     def _fit_view(self) -> None:
         """Fit the default view to clouds, map and axes when they appear, and to the arm when they are gone."""
         clouds, mapped = self._clouds.extents, self._capability.extent
@@ -413,20 +395,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             self._section.remove()
             self._section = None
         if visible:
-            self._tool = self.stage.now.T_tool[:3, 3]
-            self._section = SectionPanel(self.stage, self._new_root(), self.post)
-
-    def _update_section(self, now: float) -> None:
-        """Move the tool's dot, and count new points into the plot."""
-        section, nodes = self._section, self._clouds.nodes
-        if section is None:
-            return
-        if self._dot_due and now - self._dotted >= DOT:
-            self._dotted, self._dot_due = now, False
-            section.tool_at(self._tool)
-        due = not self._clouds.busy or now - self._plotted >= REDRAW
-        if nodes and due and section.count(nodes[0].cloud, nodes[0].parts):
-            self._plotted = now
+            self._section = SectionPanel(self.stage, new_root(), self.post)
 
 
 def _raise(error: object) -> None:

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
-import viser
 from numpy.typing import NDArray
 
 from app.shared.maps import MapRequest, MapTimeError
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node, Progress, same
+from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Result, Work
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
@@ -24,6 +24,7 @@ from app.viewer.tabs.workspace.capability import views
 from app.viewer.tabs.workspace.capability.settings import Look, MapSettings
 from app.viewer.tabs.workspace.capability.voxels import Voxels, mark
 from app.viewer.tabs.workspace.cut import Cut
+from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.views.templates import render
 from kin.workspace import CapabilityMap
@@ -79,7 +80,6 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     Args:
         window: flow control, shared with the clouds.
         post: returns the events of controls and clicks to `handle`.
-        new_root: returns a prefix of node names that was never used before.
         appears: called with the first voxels of a map that the visitor has started, before they are drawn.
     """
 
@@ -92,13 +92,11 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         stage: Stage,
         window: SendWindow,
         post: Post,
-        new_root: Callable[[], str],
         appears: Callable[[CapabilityMap], None],
     ) -> None:
-        self._window, self._to, self._new_root, self._appears = window, post, new_root, appears
+        self._window, self._to, self._appears = window, post, appears
         self._voxels: Voxels | None = None
         self._painted = 0.0
-        self._mark: viser.FrameHandle | None = None
         super().__init__(stage)
 
     def post(self, key: Hashable, value: object = None) -> None:
@@ -138,6 +136,9 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
                 open=False,
             )
         ]
+
+    def scene(self) -> Sequence[SceneNode]:
+        return [] if self.settings.picked is None else [mark(*self.settings.picked)]
 
     @property
     def extent(self) -> Sphere | None:
@@ -199,11 +200,10 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     def clear(self) -> None:
         """Stop, and remove everything."""
         self._runner.end()
-        self.change(request=None, stopped=None, unseen=False)
+        self.change(request=None, stopped=None, unseen=False, picked=None)
         if self._voxels is not None:
             self._voxels.remove()
             self._voxels = None
-        self._forget_pick()
         self.schedule()
 
     def use_look(self, colours: str, cut: Cut | None, shown: NDArray[np.bool_] | None) -> None:
@@ -233,8 +233,6 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         row = voxels.voxel(level, instance) if voxels is not None and root == voxels.root else None
         if voxels is None or row is None:
             return  # redrawn since
-        self._forget_pick()
-        self._mark = mark(self.stage.client.scene, self._new_root(), voxels.found, row)
         self.change(picked=(voxels.found, row))
 
     def _is_drawn(self, found: CapabilityMap, look: Look) -> bool:
@@ -244,7 +242,7 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         )
 
     def _draw_map(self, found: CapabilityMap, look: Look) -> None:
-        old, root = self._voxels, self._new_root()
+        old, root = self._voxels, new_root()
         self._voxels = Voxels(
             self.stage.client.scene,
             root,
@@ -256,12 +254,6 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         if old is not None:
             old.remove()
         self._window.sent(COST * self._voxels.sent)
-
-    def _forget_pick(self) -> None:
-        if self._mark is not None:
-            self._mark.remove()
-            self._mark = None
-        self.change(picked=None)
 
 
 def _note(text: str) -> str:

@@ -49,6 +49,9 @@ class SectionPanel:
 
     Args:
         root: prefix of node names, never used before in this scene.
+
+    Attributes:
+        plotting: whether points are counted.
     """
 
     def __init__(self, stage: Stage, root: str, post: Post) -> None:
@@ -64,7 +67,7 @@ class SectionPanel:
         self._frame: Plot | None = None
         # The cloud's counts; while a thread adds to them, only that thread uses them. Another cloud gets new ones.
         self._density: plot.Density | None = None
-        self._plotting = False
+        self.plotting = False
         self._image = ""
         self._units = stage.units
         self._outline: viser.FrameHandle | None = None
@@ -122,12 +125,12 @@ class SectionPanel:
 
     def count(self, cloud: Cloud, parts: int) -> bool:
         """Start counting a cloud's first parts into the plot; False if there are no new ones, or if busy."""
-        if self._frame is None or self._section is None or self._plotting:
+        if self._frame is None or self._section is None or self.plotting:
             return False
         if self._density is not None and self._density.parts >= parts:
             return False
         density = self._density = self._density or plot.Density(self._frame)
-        self._plotting = True
+        self.plotting = True
 
         def work() -> None:
             for i in range(density.parts, parts):
@@ -142,7 +145,7 @@ class SectionPanel:
     def show_cloud(self, made: Plotted) -> None:
         """Show a finished image of the points."""
         if made.density is self._density:
-            self._plotting = False
+            self.plotting = False
             self._image = made.image
             self._draw()
 
@@ -155,7 +158,7 @@ class SectionPanel:
     def drop_cloud(self) -> None:
         """Remove the cloud from the plot; the section stays."""
         self._density = None
-        self._plotting = False
+        self.plotting = False
         self._image = ""
         self._draw()
 
