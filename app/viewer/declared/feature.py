@@ -113,6 +113,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def changed(self, path: str) -> None:
         """The visitor has set the field at this path."""
 
+    def heard(self, key: Hashable, value: object) -> None:
+        """An event of no declared control, such as a message of the page's own script; raises `InputError`."""
+        raise InputError(self.key, key, "a control of this feature")
+
     def worked(self, key: str) -> None:
         """There is something new of the work with this key, in `facts`."""
         if (error := self.facts.work(key).error) is not None:
@@ -237,7 +241,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
                 assert isinstance(value, tuple)
                 getattr(self, name)(*arguments, *value[:1], value[1:])
             case _:
-                raise InputError(self.key, key, "a control of this feature")
+                self.heard(key, value)
 
     def step_name(self, key: Hashable) -> str:
         match key:

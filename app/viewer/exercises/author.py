@@ -178,14 +178,13 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     # Events
 
-    def handle(self, key: Hashable, value: object) -> None:
+    def heard(self, key: Hashable, value: object) -> None:
         match key:
             case (str(name), *rest) if name in self.messages:
                 if self.stage.activity.practice.seated:
                     raise InputError("exercise", name, "a page of a teacher: this one is a student’s in a room")
                 self.change(error=views.Refusal())  # with new facts: another page may have saved the exercise
                 self.invalidate()
-                self.schedule()
                 try:
                     self._act(name, rest, value)
                 except (ExerciseFileError, InputError) as error:
@@ -193,7 +192,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
                     self.change(error=views.Refusal(error.field, why))
                 self.invalidate()
             case _:
-                super().handle(key, value)
+                super().heard(key, value)
 
     def _act(self, name: str, rest: list[Hashable], value: object) -> None:
         data = self.facts.data

@@ -106,22 +106,19 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
 
     # A recording that is opened
 
-    def handle(self, key: Hashable, value: object) -> None:
+    def heard(self, key: Hashable, value: object) -> None:
         match key:
             case ("arriving", "upload") if isinstance(value, IncomingFile):
-                self.schedule()
                 self._opening.expect(value)
             case ("upload",):
-                self.schedule()
                 if isinstance(value, IncomingFile):
                     self._opening.take(value)
                 else:
                     self.stage.notify(Notice("error", *not_sent(value)))
             case ("read", int(number)):
-                self.schedule()
                 self._try(lambda: self._use(self._opening.result(number, value)))
             case _:
-                super().handle(key, value)
+                super().heard(key, value)
 
     def step_name(self, key: Hashable) -> str:
         return "Recording opened" if isinstance(key, tuple) and key[0] == "read" else super().step_name(key)

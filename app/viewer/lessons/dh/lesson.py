@@ -129,14 +129,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         if path in ("compare", "assign"):
             self._aim()
 
-    def handle(self, key: Hashable, value: object) -> None:
-        if isinstance(key, tuple) and key[0] in self.messages:
-            self.schedule()
-            self._do(key, value)
-        else:
-            super().handle(key, value)
-
-    def _do(self, key: Hashable, value: object) -> None:
+    def heard(self, key: Hashable, value: object) -> None:
         """Do what was asked for in the block of the student's own table; raises `InputError`."""
         if self.settings.assign is None:
             raise InputError("lesson", key, "a control of this lesson that is on show")

@@ -147,7 +147,7 @@ class Toy(DeclaredFeature[Knobs, Sums]):
     rendered = 0
 
     def started(self) -> None:
-        self.heard: list[object] = []
+        self.said: list[object] = []
         self.frames = 0
 
     def panel(self) -> Sequence[Node]:
@@ -183,13 +183,13 @@ class Toy(DeclaredFeature[Knobs, Sums]):
         return f"Σ {total} {units.length}"
 
     def changed(self, path: str) -> None:
-        self.heard.append(path)
+        self.said.append(path)
 
     def on_add(self, amount: int) -> None:
         self.change(count=self.settings.count + amount)
 
     def on_go(self, where: str) -> None:
-        self.heard.append(where)
+        self.said.append(where)
 
 
 @pytest.fixture
@@ -217,7 +217,7 @@ def test_the_panel_shows_what_is_declared_and_controls_survive(page: BarePage) -
     page.set("Step, mm", 12.5)
     page.rest()
     assert toy.settings.step == 0.0125
-    assert toy.heard == ["step"]
+    assert toy.said == ["step"]
     toy.change(runs=True, force=replace(toy.settings.force, on=True))
     toy.refresh()
     assert page.panel()[0]["content"] == "more"
@@ -310,7 +310,7 @@ def test_a_click_on_what_was_just_offered_counts(page: BarePage) -> None:
     toy = page.open(Toy)
     page.press("Go", "b")
     page.rest()
-    assert toy.heard == ["b"]
+    assert toy.said == ["b"]
     page.press("Add")
     page.press("Add")
     assert toy.step_name(page.events[0][0][2]) == "Add"

@@ -164,12 +164,10 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     # Events
 
-    def handle(self, key: Hashable, value: object) -> None:
-        if key == ("upload",):
-            self.schedule()
-            self._open(value)
-        else:
-            super().handle(key, value)
+    def heard(self, key: Hashable, value: object) -> None:
+        if key != ("upload",):
+            super().heard(key, value)
+        self._open(value)
 
     def step_name(self, key: Hashable) -> str:
         return "Calibration" if key == ("upload",) else super().step_name(key)
