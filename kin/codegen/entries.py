@@ -38,9 +38,10 @@ Limits = tuple[Array, Array, Array, Array]  # lower, upper, whole turns, weights
 SOLVED, APPROXIMATE, LIMITS, UNMET, ORIENTATION, UNREACHABLE = range(6)
 INVALID = -1
 ROWS_OF_ARCS = 256
-MEETINGS, WEIGHT = 12, 0.1  # as in `kin.ik.nearest`
+MEETINGS, WEIGHT, _SPREAD = 12, 0.1, 24  # as in `kin.ik.nearest`
 _POSITION, _ROTATION = TOLERANCES.closure_position, TOLERANCES.closure_rotation
 _SAME, _MET = TOLERANCES.same_branch, TOLERANCES.point_met
+_MINIMUM = TOLERANCES.same_minimum_angle
 _ALIKE, _SHARE = TOLERANCES.better_minimum, TOLERANCES.better_minimum_share
 
 
@@ -197,11 +198,12 @@ def nearest(
     rows: Inner, inner: Inner, model: Array, params: Array, signs: Array, target: Array, seed: Array, known: Array,
     starts: Array, limits: Limits, point: bool, found: Rows,
 ) -> int:  # fmt: skip
-    """found.q[0] ← the configuration inside the limits that comes nearest to a pose, or to its point alone.
+    """found.q[0] ← the configuration inside the limits that comes nearest to a pose, or first to its point.
 
     At 0.1 m per radian, as `kin.solve_ik` does it: descents from the seed, from the branches (known ``(k, n)`` is
-    scratch) and from points spread over the limits ``(m, n)``. SOLVED if it meets the pose as exactly as
-    those of `solve`, ORIENTATION if it meets the point alone, else UNREACHABLE, or INVALID.
+    scratch) and from points spread over the limits ``(m, n)``. Where `point` counts first and can be met, what
+    meets it with the smallest rotation error. SOLVED if it meets the pose as exactly as those of `solve`,
+    ORIENTATION if it meets the point alone, else UNREACHABLE, or INVALID.
     """
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
@@ -233,7 +235,77 @@ def nearest(
     for j in range(n):
         found.q[0, j] = q[best, j]
     pose = _requirement(model, limits, POSE)
+    if point and costs[best] <= _MET:
+        _oriented(pose, T, seed, starts[:_SPREAD], (lower, upper, turns), found.q[0])
     measure_rows(pose, T, seed, seed, found.q[:1], found.stats[:1])
     if found.stats[0, 0] <= _POSITION and found.stats[0, 1] <= _ROTATION:
         return SOLVED
     return ORIENTATION if found.stats[0, 0] <= _MET else UNREACHABLE
+
+
+def _oriented(
+    pose: Requirement, T: Array, seed: Array, starts: Array, bounds: tuple[Array, Array, Array], best: Array
+) -> None:  # fmt: skip
+    """best ``(n,)``, which meets the point ← the configuration that meets it with the smallest rotation error.
+
+    As `kin.ik.nearest.nearest_orientation`: from stage to stage a radian weighs less against a metre, and the
+    different minima of each stage are the starts of the next.
+    """
+    n, m = seed.shape[0], starts.shape[0] + 1
+    q, met, costs, mask = np.empty((2 * m, n)), np.empty((m, n)), np.empty(2 * m), np.zeros(7)
+    _copy(seed, q[0])
+    for i in range(1, m):
+        _copy(starts[i - 1], q[i])
+    each_of(pose.model, (T, POSITION, mask, 1.0), bounds, -1.0, m + 1, q[:m], costs)
+    known = 0
+    for i in range(m):
+        if costs[i] <= _MET:
+            _copy(q[i], met[known])
+            known += 1
+    count, weight = m, WEIGHT
+    for stage in range(4):
+        if stage == 1:
+            for i in range(known):
+                _copy(met[i], q[count + i])
+            count += known
+        each_of(pose.model, (T, POSE, mask, weight), bounds, -1.0, count + 1, q[:count], costs)
+        keep = _SPREAD if stage == 0 else _SPREAD // 4 if stage == 3 else _SPREAD // 2
+        count = _different(q, costs, count, _MINIMUM * weight, keep)
+        weight *= 0.1
+    each_of(pose.model, (T, POSITION, mask, 1.0), bounds, -1.0, count + 1, q[:count], costs)
+    for i in range(known):
+        _copy(met[i], q[count + i])
+        costs[count + i] = 0.0
+    count += known
+    stats = np.empty((2 * m, 5))
+    measure_rows(pose, T, seed, seed, q[:count], stats[:count])
+    least = math.inf
+    for i in range(count):
+        if costs[i] <= _MET and stats[i, 1] < least - _ALIKE:
+            least = stats[i, 1]
+            _copy(q[i], best)
+
+
+def _different(q: Array, costs: Array, count: int, same: float, keep: int) -> int:
+    """q ← at most `keep` of its rows, the smallest cost first, and of a run of equal costs two; their number."""
+    kept = np.empty(q.shape)
+    found, last, before = 0, -math.inf, -math.inf
+    for _ in range(count):
+        i = 0
+        for k in range(1, count):
+            if costs[k] < costs[i]:
+                i = k
+        if found < keep and costs[i] > before + same:
+            _copy(q[i], kept[found])
+            found += 1
+        before, last = last, costs[i]
+        costs[i] = math.inf
+    for i in range(found):
+        _copy(kept[i], q[i])
+    return found
+
+
+def _copy(row: Array, to: Array) -> None:
+    """to ``(n,)`` ← row."""
+    for j in range(row.shape[0]):
+        to[j] = row[j]
