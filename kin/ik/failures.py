@@ -43,6 +43,7 @@ from kin.ik.details import (
 from kin.ik.options import JointConstraints
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
+from kin.robot import Robot
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -269,15 +270,11 @@ def _restriction(problem: IKProblem) -> Restriction | None:
 def side_of(problem: IKProblem, q: Array) -> Cause:
     """On which side of the workspace the target's point is; q ``(n,)`` is the configuration nearest to it.
 
-    Distances are measured from the shoulder, the point of the first joint axis at the height of the second joint.
-    For a target in a hole, the direction to the nearest point tells which hole it is: straight away from the axis,
-    or away from the shoulder.
+    Distances are measured from the shoulder. For a target in a hole, the direction to the nearest point tells
+    which hole it is: straight away from the axis, or away from the shoulder.
     """
     robot, same, none = problem.robot, TOLERANCES.same_distance * problem.unit, TOLERANCES.geometry * problem.unit
-    first = link_frames(robot, q)[0]
-    axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
-    foot = robot.T_world_base[:3, 3]
-    shoulder = foot + axis * float(axis @ (first[:3, 3] - foot))
+    axis, shoulder = shoulder_of(robot, q)
     reached = fk(robot, q)[:3, 3] - shoulder
     target = problem.T[:3, 3] - shoulder
     far, near = float(np.linalg.norm(target)), float(np.linalg.norm(reached))
@@ -290,6 +287,14 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
     if robot.turns_as_one and off_axis[1] > off_axis[0] + same and np.linalg.norm(radial) > away - none:
         return "around the axis"
     return "too near" if far < near - same else "outside"
+
+
+def shoulder_of(robot: Robot, q: Array) -> tuple[Array, Array]:
+    """The direction of the first joint axis, and its point at the height of the second joint, each ``(3,)``."""
+    first = link_frames(robot, q)[0]
+    axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
+    foot = robot.T_world_base[:3, 3]
+    return axis, foot + axis * float(axis @ (first[:3, 3] - foot))
 
 
 def _blocked(problem: IKProblem, q: Array, order: list[int], branch: Sequence[int]) -> tuple[BlockedBranch, ...]:

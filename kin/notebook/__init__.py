@@ -108,14 +108,15 @@ def save_page(
 ) -> Path:
     """Write an arm as one web page that needs no server and no internet: a file of at most 2 MB.
 
-    The page has a slider for each joint, the pose of the tool, the DH table and its frames; with a target the
-    postures that meet it, with a motion a program to play. Its forward kinematics are its own.
+    The page has a slider for each joint, the pose of the tool, the DH table and its frames, a target to drag, the
+    postures that meet it, and with a motion a program to play. It solves by itself if `generate` can write the
+    arm's solver; else it has the postures of `target`.
 
     Args:
         robot: the arm, or the id of a built-in one.
         path: of the file, such as ``"ur5.html"``; a file that is there is replaced.
         q: configuration ``(n,)`` that the page opens with, radians (metres); None: the arm's home configuration.
-        target: pose of the tool ``(4, 4)``, metres.
+        target: pose of the tool ``(4, 4)`` that the page opens with, metres; None: the one at `q`.
         motion: of the same arm, from `plan_motion`.
         link: address of the full page, which the file names; "": none.
         obstacles: bodies around the arm in the world frame, which the page draws and the postures keep clear of.

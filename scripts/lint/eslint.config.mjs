@@ -16,9 +16,9 @@ export default [
     languageOptions: {
       ecmaVersion: 2023,
       sourceType: "script",
-      // static/viser_page.js, channel.js and morphdom come first in viser's page, docs.js after the library of docs.html, and three.js first in
-      // a saved page.
-      globals: { ...globals.browser, viserPage: "readonly", channel: "readonly", morphdom: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly" },
+      // static/viser_page.js, channel.js and morphdom come first in viser's page, docs.js after the library of docs.html, and three.js, the
+      // kernels of an arm and static/takehome/numbers.js first in a saved page.
+      globals: { ...globals.browser, viserPage: "readonly", channel: "readonly", morphdom: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly", kernels: "readonly", kinboard: "readonly" },
     },
     linterOptions: { reportUnusedDisableDirectives: "error" },
     rules: {

@@ -1,6 +1,7 @@
 "use strict";
-// A saved page of one arm: its sliders, its pose, its postures and its program, without a server. What it shows is in
+// A saved page of one arm: its sliders, its target, its postures and its program, without a server. What it shows is in
 // the element #data, which app/viewer/takehome wrote; lengths there are metres and angles radians, whatever is on screen.
+// An arm whose kernels can be generated solves for its target here (solver.js); another one shows what was saved.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const { robot } = data;
@@ -44,100 +45,24 @@
     return [Math.atan2(T[9], T[10]), pitch, Math.atan2(T[4], T[0])];
   }
 
-  // ---- Numbers ----
-
-  const MINUS = "\u2212";
-  const state = { q: data.q.slice(), degrees: data.units.degrees, frames: false, posture: -1, time: 0, playing: false };
-  const perLength = { mm: 1e3, cm: 1e2, m: 1, in: 1 / 0.0254 }[data.units.length];
-  const decimalsOfLength = { mm: 1, cm: 2, m: 4, in: 3 }[data.units.length];
-  const unitOf = (turns) => (turns ? (state.degrees ? "°" : "rad") : data.units.length);
-  const scaleOf = (turns) => (turns ? (state.degrees ? 180 / Math.PI : 1) : perLength);
-  const decimalsOf = (turns) => (turns ? (state.degrees ? 1 : 3) : decimalsOfLength);
-
-  function written(value, turns) {
-    const text = (value * scaleOf(turns)).toFixed(decimalsOf(turns));
-    return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", MINUS);
+  // The pose with a roll, pitch and yaw at a point: Rz(yaw) Ry(pitch) Rx(roll).
+  function poseAt([x, y, z, roll, pitch, yaw]) {
+    const [ca, sa, cb, sb, cc, sc] = [roll, pitch, yaw].flatMap((angle) => [Math.cos(angle), Math.sin(angle)]);
+    return [
+      cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa, x, sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa, y,
+      -sb, cb * sa, cb * ca, z, 0, 0, 0, 1,
+    ];
   }
 
-  function withUnit(value, turns) {
-    const unit = unitOf(turns);
-    return `${written(value, turns)}${unit === "°" ? "" : " "}${unit}`;
-  }
+  const sixOf = (T) => [T[3], T[7], T[11], ...rollPitchYaw(T)];
 
-  // A typed number in radians or metres, or null: an expression such as pi/4, 2*45 or 90deg in the unit on screen, as
-  // in the full page. Both minus signs and a comma for the point are read; pi is in radians whatever the unit.
-  const PER = { "°": 180 / Math.PI, deg: 180 / Math.PI, rad: 1, mm: 1e3, cm: 1e2, m: 1, in: 1 / 0.0254 };
-  const TOKEN = /\s*(?:(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?)|(°|deg|rad|mm|cm|in|m|pi|π)|([-+*/^()]))/iy;
-
-  function tokensOf(text) {
-    const found = [];
-    TOKEN.lastIndex = 0;
-    while (TOKEN.lastIndex < text.length) {
-      const part = TOKEN.exec(text);
-      if (!part) return null;
-      found.push(part[1] ? Number(part[1]) : (part[2] ?? part[3]).toLowerCase());
-    }
-    return found;
-  }
-
-  // A value is [number, whether it has a unit]; what has none is in the unit on screen, once it meets one that has.
-  function read(text, turns) {
-    const tokens = tokensOf(text.trim().slice(0, 100).replace(/[\u2212\u2013]/g, "-").replace(",", "."));
-    const units = turns ? ["°", "deg", "rad"] : ["mm", "cm", "m", "in"];
-    const measured = ([value, unit]) => (unit ? value : value / scaleOf(turns));
-    const next = (...wanted) => (wanted.includes(tokens[0]) ? tokens.shift() : null);
-    const fail = () => { throw new SyntaxError("no number"); };
-
-    function atom() {
-      const token = tokens.shift();
-      if (token === "(") { const value = sum(); return next(")") ? value : fail(); }
-      if (token === "pi" || token === "π") return [Math.PI, turns];
-      if (typeof token !== "number") return fail();
-      return next("pi", "π") ? [token * Math.PI, turns] : [token, false];
-    }
-    function power() {
-      const [value, unit] = atom();
-      if (!next("^")) return [value, unit];
-      const sign = next("-") ? -1 : 1;
-      const exponent = tokens.shift();
-      return unit || typeof exponent !== "number" ? fail() : [value ** (sign * exponent), false];
-    }
-    function signed() {
-      let sign = 1;
-      for (let mark = next("+", "-"); mark; mark = next("+", "-")) if (mark === "-") sign = -sign;
-      const [value, unit] = power();
-      const name = next(...units);
-      if (!name) return [sign * value, unit];
-      return unit && name !== "rad" ? fail() : [(sign * value) / PER[name], true];
-    }
-    function term() {
-      let [value, unit] = signed();
-      for (let mark = next("*", "/"); mark; mark = next("*", "/")) {
-        const [other, has] = signed();
-        if (has && (unit || mark === "/")) fail();
-        value = mark === "*" ? value * other : value / other;
-        unit ||= has;
-      }
-      return [value, unit];
-    }
-    function sum() {
-      let value = term();
-      for (let mark = next("+", "-"); mark; mark = next("+", "-")) {
-        let other = term();
-        if (value[1] || other[1]) { value = [measured(value), true]; other = [measured(other), true]; }
-        value = [value[0] + (mark === "+" ? other[0] : -other[0]), value[1]];
-      }
-      return value;
-    }
-    try {
-      if (!tokens?.length) return null;
-      const value = measured(sum());
-      return tokens.length || !Number.isFinite(value) ? null : value;
-    } catch (error) {
-      if (error instanceof SyntaxError) return null;
-      throw error;
-    }
-  }
+  const { read, scaleOf, decimalsOf, sentence, unitOf, withUnit, written } = kinboard.numbers(data.units);
+  const solver = data.solver && kinboard.solver(kernels, data.solver, fk);
+  const words = data.solver && kinboard.words(data.solver, sentence);
+  const state = {
+    q: data.q.slice(), target: data.target?.pose ?? (solver && fk(data.q)), saved: Boolean(data.target), found: null, chosen: -1,
+    value: null, frames: false, ghosts: true, time: 0, playing: false,
+  };
 
   // ---- The scene ----
 
@@ -187,6 +112,7 @@
       this.scene = new THREE.Scene();
       this.camera = new THREE.PerspectiveCamera(45, 1, data.radius / 50, data.radius * 100);
       this.camera.up.set(0, 0, 1);
+      if (state.target) this.addTarget(canvas);
       this.controls = new THREE.OrbitControls(this.camera, canvas);
       this.controls.addEventListener("change", () => this.draw());
       this.waiting = false;
@@ -210,19 +136,73 @@
         this.links[link].add(frame);
         return frame;
       });
-      if (data.target) {
-        this.target = axes(data.size * 4, data.size * 0.12);
-        place(this.target, data.target.pose);
-        this.scene.add(this.target);
-      }
+      this.ghosts = [];
       this.fit();
+    }
+
+    // The frame of the target, with arrows or rings to drag it where the page solves. They are asked for the pointer
+    // before the view is, which they stop from turning.
+    addTarget(canvas) {
+      this.target = axes(data.size * 4, data.size * 0.12);
+      this.scene.add(this.target);
+      if (!solver) return;
+      this.grip = new THREE.TransformControls(this.camera, canvas);
+      this.grip.setSize(0.7);
+      this.grip.attach(this.target);
+      this.scene.add(this.grip.getHelper());
+      this.grip.addEventListener("dragging-changed", ({ value }) => { this.controls.enabled = !value; });
+      this.grip.addEventListener("change", () => this.draw());
+      this.grip.addEventListener("objectChange", () => {
+        this.target.updateMatrix();
+        const e = this.target.matrix.elements; // by columns
+        aim([e[0], e[4], e[8], e[12], e[1], e[5], e[9], e[13], e[2], e[6], e[10], e[14], 0, 0, 0, 1]);
+      });
+    }
+
+    showTarget(T) {
+      this.target.matrix.set(...T).decompose(this.target.position, this.target.quaternion, this.target.scale);
+      this.draw();
+    }
+
+    turnTarget(on) {
+      this.grip.setMode(on ? "rotate" : "translate");
+      this.grip.setSpace(on ? "local" : "world");
+    }
+
+    // The arm in other postures, pale; link by link as the arm itself, but for what stands still.
+    showGhosts(configurations) {
+      while (this.ghosts.length < configurations.length) this.ghosts.push(this.ghost());
+      this.ghosts.forEach((links, k) => {
+        const poses = configurations[k] && linkPoses(configurations[k]);
+        links.forEach((link, i) => {
+          link.visible = Boolean(poses);
+          if (poses) place(link, poses[i + 1]);
+        });
+      });
+      this.draw();
+    }
+
+    ghost() {
+      this.pale ??= new THREE.MeshStandardMaterial({ color: 0x7d8a97, transparent: true, opacity: 0.16, depthWrite: false });
+      const links = this.links.slice(1).map((link) => {
+        const group = new THREE.Group();
+        for (const { geometry: shape, matrix, matrixAutoUpdate } of link.children.filter((child) => child.isMesh)) {
+          const mesh = new THREE.Mesh(shape, this.pale);
+          mesh.matrixAutoUpdate = matrixAutoUpdate;
+          mesh.matrix.copy(matrix);
+          group.add(mesh);
+        }
+        return group;
+      });
+      this.scene.add(...links);
+      return links;
     }
 
     light() {
       const key = new THREE.DirectionalLight(0xfffcf6, 2.6);
-      const aim = new THREE.Vector3(...data.center);
-      key.position.copy(new THREE.Vector3(0.95, -0.15, 1.6).normalize().multiplyScalar(5 * data.radius).add(aim));
-      key.target.position.copy(aim);
+      const middle = new THREE.Vector3(...data.center);
+      key.position.copy(new THREE.Vector3(0.95, -0.15, 1.6).normalize().multiplyScalar(5 * data.radius).add(middle));
+      key.target.position.copy(middle);
       key.castShadow = true;
       key.shadow.mapSize.set(2048, 2048);
       key.shadow.normalBias = data.size * 0.2;
@@ -335,49 +315,68 @@
     return made;
   }
 
+  const REST = 150; // ms without a new target: the pointer rests
+  const QUICK = 30; // ms of a frame
+  const FAR = 1000; // m, of a target
   // Sign of a key's step of one degree or millimetre, and how many.
   const STEPS = {
     ArrowLeft: [-1, 1], ArrowDown: [-1, 1], ArrowRight: [1, 1], ArrowUp: [1, 1], PageDown: [-1, 10], PageUp: [1, 10],
   };
 
-  const rows = robot.joints.map((joint, i) => {
-    const slider = node("input", { type: "range", step: "any", min: joint.lower, max: joint.upper, "aria-label": joint.name });
-    const field = node("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${joint.name}, exact value` });
+  // How far a key moves a value; 0: it does not.
+  function stepOf(event, turns) {
+    const [sign, far] = STEPS[event.key] ?? [0, 1];
+    if (event.ctrlKey || event.metaKey || event.altKey) return 0;
+    return sign * (turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1);
+  }
+
+  // A field for a number, between two limits if there are any; set(value) takes what was typed.
+  function numberField(name, turns, [low, high], value, set) {
+    const field = node("input", { type: "text", inputmode: low < 0 ? "text" : "decimal", autocomplete: "off", "aria-label": name });
     const unit = node("span");
     const error = node("p", { role: "alert", hidden: "" });
-    const label = node("label", { title: joint.name }, joint.name);
-    const row = node("div", { class: "joint" }, label, slider, field, unit, error);
-    row.style.setProperty("--of", `rgb(${joint.color})`);
-    find("#joints").append(row);
-    slider.addEventListener("input", () => { pause(); move(i, clamp(Number(slider.value), joint.lower, joint.upper)); });
-    // Without this the keys of a slider move it by a hundredth of its range.
-    slider.addEventListener("keydown", (event) => {
-      const [sign, far] = STEPS[event.key] ?? [0, 1];
-      if (!sign || event.ctrlKey || event.metaKey || event.altKey) return;
-      event.preventDefault();
-      const size = (joint.turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1);
-      pause();
-      move(i, clamp(state.q[i] + sign * size, joint.lower, joint.upper));
-    });
-    const typed = () => {
-      const value = read(field.value, joint.turns);
-      const [low, high] = [joint.lower, joint.upper].map((limit) => withUnit(limit, joint.turns));
-      const half = 0.5 / 10 ** decimalsOf(joint.turns) / scaleOf(joint.turns); // what the limits on screen are rounded by
-      const wrong = value === null || value < joint.lower - half || value > joint.upper + half;
+    const accept = (wrong) => {
       field.setAttribute("aria-invalid", wrong);
       error.hidden = !wrong;
-      error.textContent = wrong ? `A number from ${low} to ${high}.` : "";
-      if (!wrong) { pause(); move(i, clamp(value, joint.lower, joint.upper)); }
     };
-    field.addEventListener("change", typed);
+    field.addEventListener("change", () => {
+      const typed = read(field.value, turns);
+      const half = 0.5 / 10 ** decimalsOf(turns) / scaleOf(turns); // what the limits on screen are rounded by
+      const wrong = typed === null || typed < low - half || typed > high + half;
+      accept(wrong);
+      const range = Number.isFinite(high - low) ? ` from ${withUnit(low, turns)} to ${withUnit(high, turns)}` : "";
+      error.textContent = wrong ? `A number${range}.` : "";
+      if (!wrong) set(clamp(typed, low, high));
+    });
     field.addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;
-      field.setAttribute("aria-invalid", false);
-      error.hidden = true;
+      accept(false);
       field.blur();
       show();
     });
-    return { slider, field, unit };
+    function refresh() {
+      unit.textContent = unitOf(turns);
+      if (document.activeElement !== field) field.value = written(value(), turns);
+    }
+    return { field, unit, error, refresh };
+  }
+
+  const rows = robot.joints.map((joint, i) => {
+    const { lower, upper, name, turns } = joint;
+    const slider = node("input", { type: "range", step: "any", min: lower, max: upper, "aria-label": name });
+    const number = numberField(`${name}, exact value`, turns, [lower, upper], () => state.q[i], (value) => move(i, value));
+    const row = node("div", { class: "joint" }, node("label", { title: name }, name), slider, number.field, number.unit, number.error);
+    row.style.setProperty("--of", `rgb(${joint.color})`);
+    find("#joints").append(row);
+    slider.addEventListener("input", () => move(i, clamp(Number(slider.value), lower, upper)));
+    // Without this the keys of a slider move it by a hundredth of its range.
+    slider.addEventListener("keydown", (event) => {
+      const by = stepOf(event, turns);
+      if (!by) return;
+      event.preventDefault();
+      move(i, clamp(state.q[i] + by, lower, upper));
+    });
+    return { slider, ...number };
   });
 
   const cells = robot.rows.map((row) => {
@@ -393,7 +392,7 @@
   });
 
   function heads() {
-    const angle = state.degrees ? "°" : "rad";
+    const angle = unitOf(true);
     const names = ["row", `θ (${angle})`, `d (${data.units.length})`, `a (${data.units.length})`, `α (${angle})`];
     find("#rows thead")?.remove();
     find("#rows table").prepend(node("thead", {}, node("tr", {}, ...names.map((name) => node("th", { scope: "col" }, name)))));
@@ -407,10 +406,10 @@
 
   let describing = 0;
 
-  function describe(numbers) {
+  function describe(shown) {
     clearTimeout(describing);
     describing = setTimeout(() => {
-      const point = numbers.slice(0, 3).map((value, k) => `${"xyz"[k]} ${written(value, false)}`).join(", ");
+      const point = shown.slice(0, 3).map((value, k) => `${"xyz"[k]} ${written(value, false)}`).join(", ");
       const joints = robot.joints.map((joint, i) => `${joint.name} ${withUnit(state.q[i], joint.turns)}`).join(", ");
       find("#scene canvas").setAttribute("aria-label", `${data.title}. Tool at ${point} ${data.units.length}. ${joints}.`);
     }, 300);
@@ -420,16 +419,14 @@
   function show() {
     const poses = linkPoses(state.q);
     scene?.show(poses);
-    rows.forEach(({ slider, field, unit }, i) => {
-      const joint = robot.joints[i];
+    rows.forEach(({ slider, refresh }, i) => {
       slider.value = state.q[i];
-      slider.setAttribute("aria-valuetext", withUnit(state.q[i], joint.turns));
-      unit.textContent = unitOf(joint.turns);
-      if (document.activeElement !== field) field.value = written(state.q[i], joint.turns);
+      slider.setAttribute("aria-valuetext", withUnit(state.q[i], robot.joints[i].turns));
+      refresh();
     });
     const T = product(poses.at(-1), robot.tool);
-    const numbers = [T[3], T[7], T[11], ...rollPitchYaw(T)];
-    pose.forEach((cell, k) => { cell.textContent = withUnit(numbers[k], k > 2); });
+    const shown = sixOf(T);
+    pose.forEach((cell, k) => { cell.textContent = withUnit(shown[k], k > 2); });
     cells.forEach((line, k) => {
       const row = robot.rows[k];
       ["theta", "d", "a", "alpha"].forEach((name, j) => {
@@ -437,43 +434,192 @@
         line[j].textContent = written(value, name === "theta" || name === "alpha");
       });
     });
-    describe(numbers);
+    if (state.target) scene?.showTarget(state.target);
+    for (const { refresh } of aims) refresh();
+    showPostures();
+    describe(shown);
+  }
+
+  // ---- Target and postures ----
+
+  // The six numbers of the target, where the page solves for it.
+  const aims = !solver ? [] : ["x", "y", "z", "roll", "pitch", "yaw"].map((name, k) => {
+    const set = (value) => aim(poseAt(sixOf(state.target).with(k, value)));
+    const made = numberField(`target ${name}`, k > 2, k > 2 ? [-Infinity, Infinity] : [-FAR, FAR], () => sixOf(state.target)[k], set);
+    made.field.addEventListener("keydown", (event) => {
+      const by = ["ArrowLeft", "ArrowRight"].includes(event.key) ? 0 : stepOf(event, k > 2);
+      if (!by) return;
+      event.preventDefault();
+      set(sixOf(state.target)[k] + by);
+      made.field.value = written(sixOf(state.target)[k], k > 2);
+    });
+    find("#aim").append(node("div", { class: "aim" }, node("label", {}, name), made.field, made.unit, made.error));
+    return made;
+  });
+
+  let waiting = false;
+  let leads = false; // whether the arm goes where the target leads it, to the posture that is nearest to where it is
+  let resting = 0;
+  let took = 0; // ms, to find what comes closest
+
+  // A new target: solved for at the next frame, so at most once a frame.
+  function aim(T) {
+    pause();
+    Object.assign(state, { target: T, value: null, saved: false });
+    leads = true;
+    solveSoon();
+  }
+
+  // The target follows the tool when joints are moved.
+  function follow() {
+    if (!solver) return;
+    Object.assign(state, { target: fk(state.q), value: null, saved: false });
+    leads = false;
+    if (state.playing) state.found = null;
+    else solveSoon();
+  }
+
+  function solveSoon() {
+    clearTimeout(resting);
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; solve(); });
+  }
+
+  function solve() {
+    if (state.playing) return;
+    state.found = solver.answer(state.target, state.q, state.value);
+    const reached = ["solved", "approximate"].includes(state.found.status);
+    if (reached && leads) state.q = state.found.rows[0].q;
+    if (reached && data.solver.parameter) resting = setTimeout(showFree, REST);
+    // Arms with few joints seldom meet a whole pose: they follow the point as it is dragged, where that is quick.
+    if (!reached && data.solver.few && leads && took < QUICK) rest();
+    else if (!reached && !state.saved) resting = setTimeout(rest, REST);
+    show();
+  }
+
+  // Where the pointer rests on a target without a configuration, the arm comes as close to it as it can.
+  function rest() {
+    const start = performance.now();
+    const found = solver.why(state.target, state.q, state.found);
+    took = performance.now() - start;
+    state.found = found;
+    state.q = (found.closest ?? found.rows[0]).q;
+    show();
+  }
+
+  // In the order of the branches, whichever is nearest.
+  function postures() {
+    if (state.found) return state.found.rows.toSorted((a, b) => a.row - b.row);
+    return solver && !state.saved ? [] : data.target?.postures ?? [];
+  }
+  const isShown = ({ q }) => q.every((value, i) => Math.abs(value - state.q[i]) < 1e-6);
+  const nameOf = (row) => row.name ?? data.solver.branches[row.row]?.[1] ?? "found by search";
+  const reason = () => {
+    if (state.saved || !solver) return data.target?.reason ?? "";
+    return state.found ? words.text(state.found) || "No configuration meets this target." : "";
+  };
+
+  // The list of postures; built anew only where others are in it, so that a button keeps the focus.
+  function showPostures() {
+    const list = find("#postures");
+    const all = postures();
+    const outside = state.found?.status === "limits";
+    const text = reason();
+    if (find("#status").textContent !== text) find("#status").textContent = text;
+    find("#status").hidden = !text;
+    find("#status").dataset.status = state.found?.status ?? "saved";
+    const key = JSON.stringify([outside, all.map(nameOf)]);
+    if (list.dataset.key !== key) {
+      list.dataset.key = key;
+      list.replaceChildren(...all.map((row, k) => {
+        const button = node("button", { type: "button" }, nameOf(row));
+        button.disabled = outside;
+        button.addEventListener("click", () => pick(k));
+        return node("li", {}, button);
+      }));
+    }
+    state.chosen = all.findIndex(isShown);
+    [...list.querySelectorAll("button")].forEach((button, k) => {
+      button.setAttribute("aria-pressed", k === state.chosen);
+      button.title = outside ? all[k].beyond.map(words.need).join(", ") : "";
+    });
+    scene?.showGhosts(state.ghosts && !outside ? all.filter((_, k) => k !== state.chosen).map(({ q }) => q) : []);
+  }
+
+  function pick(k) {
+    pause();
+    state.q = postures()[k].q.slice();
+    show();
+    if (data.solver?.parameter) showFree();
   }
 
   function move(i, value) {
+    pause();
     state.q[i] = value;
-    choose(-1);
+    follow();
     show();
   }
 
   function go(q) {
     state.q = q.slice();
+    follow();
     show();
   }
 
-  // ---- Postures ----
+  // ---- The redundancy parameter: a slider, and the values that the limits allow ----
 
-  function choose(k) {
-    state.posture = k;
-    if (!data.target) return;
-    const { postures } = data.target;
-    const chosen = postures[k];
-    find("#posture").textContent = chosen ? `${k + 1} of ${postures.length}: ${chosen.name}` : `none of ${postures.length} chosen`;
+  const free = data.solver?.parameter && freeSlider(data.solver.parameter);
+
+  function freeSlider({ label, low, high }) {
+    const slider = node("input", { type: "range", step: "any", min: low, max: high, "aria-label": label });
+    const number = numberField(`${label}, exact value`, true, [low, high], () => Number(slider.value), hold);
+    find("#free .joint").append(node("label", {}, label), slider, number.field, number.unit, number.error);
+    find("#free").hidden = false;
+    slider.addEventListener("input", () => hold(Number(slider.value)));
+    slider.addEventListener("keydown", (event) => {
+      const by = stepOf(event, true);
+      if (!by) return;
+      event.preventDefault();
+      hold(clamp(Number(slider.value) + by, low, high));
+    });
+    return { slider, ...number };
   }
 
-  function step(by) {
-    const { length } = data.target.postures;
-    const k = state.posture < 0 ? (by > 0 ? 0 : length - 1) : (state.posture + by + length) % length;
+  // Another value while the tool stays: the arm keeps its posture, by name, if it has it there.
+  function hold(value) {
     pause();
-    choose(k);
-    go(data.target.postures[k].q);
+    const now = postures()[state.chosen]?.branch;
+    const found = solver.answer(state.target, state.q, value);
+    free.slider.value = value;
+    if (found.status === "solved") {
+      Object.assign(state, { value, found, q: (found.rows.find(({ branch }) => branch === now) ?? found.rows[0]).q });
+      free.error.hidden = true;
+    } else {
+      free.error.hidden = false;
+      free.error.textContent = `The limits do not allow ${withUnit(value, true)} at this target.`;
+    }
+    show();
+    showFree();
   }
 
-  if (data.target) {
-    find("#target").hidden = false;
-    find("#reason").textContent = data.target.reason;
-    find("#steps").hidden = !data.target.postures.length;
-    choose(-1);
+  // The bar of values that the limits allow in the posture on show.
+  function showFree() {
+    const row = postures()[state.chosen];
+    const { low, high } = data.solver.parameter;
+    const allowed = row ? solver.intervals(state.target, state.q, row.branch) : [];
+    const percent = (value) => 100 * clamp((value - low) / (high - low), 0, 1);
+    find("#free .track").replaceChildren(...allowed.map(([from, to]) => {
+      const bar = node("span");
+      bar.style.left = `${percent(from)}%`;
+      bar.style.width = `max(2px, ${percent(to) - percent(from)}%)`;
+      return bar;
+    }));
+    const listed = allowed.slice(0, 4).map(([from, to]) => `${written(from, true)} … ${withUnit(to, true)}`).join(", ");
+    find("#free .quiet").textContent = listed ? `feasible: ${listed}` : "no value is feasible";
+    if (row) free.slider.value = state.value ?? solver.valueAt(state.target, row);
+    free.slider.setAttribute("aria-valuetext", withUnit(Number(free.slider.value), true));
+    free.refresh();
   }
 
   // ---- Program ----
@@ -496,13 +642,14 @@
     state.time = clamp(time, 0, duration);
     slide.value = state.time;
     clock.textContent = `${state.time.toFixed(2)} of ${duration.toFixed(2)} s`;
-    choose(-1);
     go(at(state.time));
   }
 
   function pause() {
+    if (!state.playing) return;
     state.playing = false;
     find("[data-do=play]").textContent = "Play";
+    follow();
   }
 
   function tick(now) {
@@ -542,10 +689,24 @@
       find("[data-do=frames]").setAttribute("aria-pressed", state.frames);
       scene?.showFrames(state.frames);
     },
-    saved: () => { pause(); choose(-1); go(data.q); },
-    home: () => { pause(); choose(-1); go(robot.joints.map((joint) => joint.home)); },
-    before: () => step(-1),
-    next: () => step(1),
+    ghosts: () => {
+      state.ghosts = !state.ghosts;
+      find("[data-do=ghosts]").setAttribute("aria-pressed", state.ghosts);
+      showPostures();
+    },
+    turn: () => {
+      const on = find("[data-do=turn]").getAttribute("aria-pressed") !== "true";
+      find("[data-do=turn]").setAttribute("aria-pressed", on);
+      scene?.turnTarget(on);
+    },
+    saved: () => {
+      pause();
+      go(data.q);
+      if (data.target) Object.assign(state, { target: data.target.pose, saved: true, found: null });
+      show();
+    },
+    home: () => { pause(); go(robot.joints.map((joint) => joint.home)); },
+    tool: () => { pause(); go(state.q); },
     play,
   };
   document.addEventListener("click", (event) => actions[event.target.closest("[data-do]")?.dataset.do]?.());
@@ -561,9 +722,9 @@
     keys[event.key]();
   });
 
-  find("[data-choose=angle]").value = state.degrees ? "deg" : "rad";
+  find("[data-choose=angle]").value = data.units.degrees ? "deg" : "rad";
   find("[data-choose=angle]").addEventListener("change", (event) => {
-    state.degrees = event.target.value === "deg";
+    data.units.degrees = event.target.value === "deg";
     heads();
     show();
   });
@@ -585,7 +746,11 @@
     scene.resize();
     scene.fit();
   }
+  find("#target").hidden = !state.target;
+  for (const each of document.querySelectorAll("[data-needs]")) each.hidden = !{ solver, target: state.target }[each.dataset.needs];
+  if (solver) find("#target-title").textContent = "Target";
+  if (solver && data.target?.plain !== false) solveSoon();
   show();
-  // For scripts beside this one: forward kinematics as the page computes it.
-  window.kinboardArm = { fk, q: () => state.q.slice() };
+  // For scripts beside this one: what the page computes and shows.
+  window.kinboardArm = { fk, scene, q: () => state.q.slice(), target: () => state.target, found: () => state.found };
 })();

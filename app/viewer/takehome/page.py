@@ -1,9 +1,10 @@
-"""One arm as one HTML file: sliders, pose, DH table, the postures of a target and a program, without a server.
+"""One arm as one HTML file: sliders, a target to drag, its postures, DH table and a program, without a server.
 
 The file holds the arm as data and a script that moves it. The script computes forward kinematics itself, from the
-same constants as the scene of the viewer (:mod:`app.viewer.scene.chain`), so each slider answers at once; inverse
-kinematics and programs are solved here, and the file holds their answers. Its parts are the template
-``takehome/page.html``, ``static/takehome`` (style and script) and three.js in ``static/vendor/three``.
+same constants as the scene of the viewer (:mod:`app.viewer.scene.chain`), so each slider answers at once, and
+inverse kinematics with the arm's own kernels (:mod:`app.viewer.takehome.solver`). The postures of an arm whose
+kernels cannot be generated, and programs, are solved here, and the file holds the answers. Its parts are the
+template ``takehome/page.html``, ``static/takehome`` (style and scripts) and three.js in ``static/vendor/three``.
 
 Nothing is loaded from elsewhere, which a content security policy in the file makes certain.
 """
@@ -15,7 +16,7 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part, joint_color
 from app.viewer.scene.chain import Link, chain
 from app.viewer.scene.meshes import Body, body
+from app.viewer.takehome.solver import solver_of
 from app.viewer.views.templates import render
 from kin import IKOptions, InputError, Obstacle, Robot, __version__, solve_ik
 from kin.collision.solids import BOX, CYLINDER
@@ -37,10 +39,13 @@ from kin.motion import Motion
 from kin.named import robot_of
 from kin.robot import Joint
 from kin.transforms import Array
-from kin.units import DEFAULT_UNITS, Units
+from kin.units import DEFAULT_UNITS, Units, typeset
 
 LARGEST = 2_000_000  # bytes of a file: what learning platforms and mail take without a question
 HIGHLIGHTED = "The highlighted value of a row moves with its joint."
+SCRIPTS = ("takehome/numbers.js", "takehome/solver.js", "takehome/page.js")
+# What the pages of all arms have in common, by the name of a file of its own.
+_SHARED = {"page.css": ("takehome/page.css",), "three.js": ("vendor/three/three.min.js",), "page.js": SCRIPTS}
 RATE = 60.0  # of the samples of a program, per second
 MOST_SAMPLES = 3000  # of a program: a longer one has fewer a second
 _STEPS = 65535  # of a coordinate of a mesh, over the size of the mesh
@@ -98,23 +103,32 @@ def save_page(
     return file
 
 
-def web_page(saved: SavedArm) -> str:
+def web_page(saved: SavedArm, shared: bool = False) -> str:
     """The file, of at most `LARGEST` bytes.
 
     A body with more triangles than there is room for gives way to the one made from the table.
+
+    Args:
+        shared: whether what the pages of all arms have in common is in files beside this one (`shared_files`).
 
     Raises:
         InputError: a link that is no address of a web page, or a program with nothing to drive.
     """
     if saved.link and not saved.link.startswith(("http://", "https://")):
         raise InputError("link", saved.link, "an address that begins with http:// or https://")
-    page = _page(saved, saved.drawn)
+    page = _page(saved, saved.drawn, shared)
     if saved.drawn is not None and len(page.encode()) > LARGEST:
-        page = _page(saved, None)
+        page = _page(saved, None, shared)
     return page
 
 
-def _page(saved: SavedArm, drawn: Drawing | None) -> str:
+def shared_files() -> dict[str, str]:
+    """The files beside pages that share them: texts by name."""
+    return {name: _text(name) for name in _SHARED}
+
+
+def _page(saved: SavedArm, drawn: Drawing | None, shared: bool) -> str:
+    solver = solver_of(saved.robot)
     return render(
         "takehome/page",
         title=saved.robot.name,
@@ -123,15 +137,29 @@ def _page(saved: SavedArm, drawn: Drawing | None) -> str:
         version=__version__,
         link=saved.link,
         data=_as_script(_data(saved, drawn)),
-        style=_text("takehome/page.css"),
-        three=_text("vendor/three/three.min.js"),
-        script=_text("takehome/page.js"),
+        shared=shared,
+        style=_text("page.css"),
+        three=_text("three.js"),
+        kernels=Markup(solver.script),
+        script=_text("page.js"),
+        refusal=solver.refusal,
+        ignored=_ignored(saved),
     )
 
 
 @cache
 def _text(name: str) -> Markup:
-    return Markup((static_folder() / name).read_text(encoding="utf-8"))
+    texts = [(static_folder() / part).read_text(encoding="utf-8") for part in _SHARED[name]]
+    return Markup("\n".join(texts))
+
+
+def _ignored(saved: SavedArm) -> str:
+    """What counts for the saved target and not for the ones that the page solves for."""
+    options = replace(saved.options, obstacles=())
+    parts = ["obstacles are drawn, not avoided"] if saved.obstacles else []
+    if options != _OPTIONS:
+        parts.append("locked joints, a chosen posture and what else was asked of the saved target do not count")
+    return "; ".join(parts)
 
 
 def _as_script(data: dict[str, Any]) -> Markup:
@@ -161,6 +189,7 @@ def _data(saved: SavedArm, drawn: Drawing | None) -> dict[str, Any]:
         "floor": made.mount.floor,
         "target": None if saved.target is None else _target(saved, saved.target),
         "program": None if saved.motion is None else _program(saved.motion),
+        "solver": solver_of(robot).about,
     }
 
 
@@ -268,8 +297,9 @@ def _target(saved: SavedArm, target: ArrayLike) -> dict[str, Any]:
     postures = [{"q": each.q.tolist(), "name": short(each.branch)} for each in result.solutions]
     return {
         "pose": np.asarray(target, dtype=float).ravel().tolist(),
-        "reason": result.explain(saved.units).text,
+        "reason": typeset(result.explain(saved.units).text),
         "postures": postures,
+        "plain": saved.options == _OPTIONS,
     }
 
 

@@ -5,3 +5,4 @@ export {
   SRGBColorSpace, Vector3, WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+export { TransformControls } from "three/examples/jsm/controls/TransformControls.js";

@@ -20,6 +20,7 @@ from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid
 from app.viewer.takehome import LARGEST, SavedArm, save_page, web_page
+from app.viewer.takehome.page import shared_files
 from app.viewer.takehome.sending import send_page
 from kin.motion import JointTarget, Program, Ptp
 from kin.units import DEFAULT_UNITS, Units
@@ -73,6 +74,16 @@ def test_nothing_is_loaded_from_elsewhere():
     assert not re.search(r"https?:|//", policy[1])
     markup = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
     assert re.findall(r'(?:src|href)="([^"]*)"', markup) == ["data:,", "https://arms.example/viewer/#s=x"]
+
+
+def test_pages_may_share_what_they_have_in_common():
+    page, files = web_page(SavedArm(UR5, Q), shared=True), shared_files()
+    markup = re.sub(r"<(script|style).*?</\1>", lambda found: found[0].partition(">")[0], page, flags=re.DOTALL)
+    assert sorted(re.findall(r'(?:src|href)="([^"]*)"', markup)) == ["data:,", *sorted(files)]
+    assert "script-src 'unsafe-inline' 'self'; style-src 'unsafe-inline' 'self';" in page
+    alone = web_page(SavedArm(UR5, Q))
+    assert all(text in alone for text in files.values())
+    assert len(alone.encode()) - len(page.encode()) > 500_000
 
 
 def test_postures_of_the_target_meet_it():

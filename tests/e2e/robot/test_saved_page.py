@@ -16,6 +16,7 @@ import kin
 from app.viewer.takehome import SavedArm, web_page
 from app.viewer.takehome.page import arm_data
 from kin.motion import JointTarget, Program, Ptp
+from kin.units import typeset
 
 pytestmark = pytest.mark.browser
 
@@ -42,6 +43,12 @@ READ = {  # typed where angles are in degrees
     "−30,5": np.radians(-30.5),
     ".5pi": np.pi / 2,
 }
+MIDDLE = """() => {
+  const { target, camera } = kinboardArm.scene;
+  const box = document.querySelector("#scene canvas").getBoundingClientRect();
+  const { x, y } = target.position.clone().project(camera);
+  return [box.x + (x + 1) / 2 * box.width, box.y + (1 - y) / 2 * box.height];
+}"""  # of the target on screen
 DESCRIBED = (
     "UR5. Tool at x −490.6, y −272.1, z 282.5 mm. base 17.2°, shoulder −68.8°, elbow 80.2°, wrist 1 −57.3°, "
     "wrist 2 −85.9°, wrist 3 11.5°."
@@ -133,9 +140,10 @@ def test_a_slider_and_a_typed_value_move_the_arm(saved: Page) -> None:
 @pytest.mark.full
 def test_the_postures_are_stepped_through_and_the_program_plays(saved: Page) -> None:
     T, seen = kin.fk(UR5, Q), []
-    for k in range(8):
-        saved.get_by_role("button", name="Next posture").click()
-        expect(saved.locator("#posture")).to_contain_text(f"{k + 1} of 8: ")
+    expect(saved.locator("#postures button")).to_have_count(8)
+    for button in saved.locator("#postures button").all():
+        button.click()
+        expect(button).to_have_attribute("aria-pressed", "true")
         seen.append(saved.evaluate("kinboardArm.q()"))
         assert np.allclose(kin.fk(UR5, seen[-1]), T, atol=1e-9)
     assert len({tuple(np.round(q, 6)) for q in seen}) == 8
@@ -146,6 +154,53 @@ def test_the_postures_are_stepped_through_and_the_program_plays(saved: Page) -> 
     assert np.allclose(saved.evaluate("kinboardArm.q()"), Q + 0.5)
     saved.get_by_label("Time of the program").press("Home")
     assert np.allclose(saved.evaluate("kinboardArm.q()"), Q)
+
+
+def settled(page: Page) -> dict:
+    """The answer on show, once the page has solved."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return page.evaluate("({ ...kinboardArm.found(), T: kinboardArm.target(), q: kinboardArm.q() })")
+
+
+def test_a_target_is_typed_and_dragged_and_the_page_solves(saved: Page) -> None:
+    expect(saved.locator("#status")).to_have_text("Reached: 8 configurations for this pose.")
+    field = saved.get_by_label("target x")
+    field.fill("-0.45 m")
+    field.press("Enter")
+    found = settled(saved)
+    T = kin.fk(UR5, Q)
+    T[0, 3] = -0.45
+    assert np.allclose(np.reshape(found["T"], (4, 4)), T, atol=1e-12)
+    expected = kin.solve_ik(UR5, T, q_seed=Q)
+    names = [each.branch.replace(" · ", ", ") for each in expected.solutions]
+    assert [row["branch"] for row in found["rows"]] == names
+    assert np.allclose(found["q"], expected.solutions[0].q, atol=1e-9)
+    field.focus()
+    field.press("ArrowUp")
+    assert settled(saved)["T"][3] == pytest.approx(-0.449)
+    place = saved.evaluate(MIDDLE)
+    saved.mouse.move(*place)
+    saved.mouse.down()
+    saved.mouse.move(place[0] + 30, place[1] - 40, steps=4)
+    saved.mouse.up()
+    found = settled(saved)
+    dragged = np.reshape(found["T"], (4, 4))
+    assert np.linalg.norm(dragged[:3, 3] - T[:3, 3]) > 0.02
+    assert np.allclose(dragged[:3, :3], T[:3, :3], atol=1e-9), "arrows move, they do not turn"
+    assert np.allclose(kin.fk(UR5, found["q"]), dragged, atol=1e-9)
+    field.fill("3 m")
+    field.press("Enter")
+    expect(saved.locator("#status")).to_contain_text("Out of reach by ")
+    far = np.reshape(settled(saved)["T"], (4, 4))
+    expected = kin.solve_ik(UR5, far, q_seed=found["q"])
+    said = expected.explain()._replace(note="").text  # the page names no singularity
+    expect(saved.locator("#status")).to_have_text(typeset(said))
+    closest = expected.closest
+    assert closest is not None
+    assert np.allclose(kin.fk(UR5, settled(saved)["q"]), kin.fk(UR5, closest.q), atol=1e-5)
+    assert saved.locator("#postures button").count() == 0
+    saved.get_by_role("button", name="As saved").click()
+    expect(saved.locator("#postures button")).to_have_count(8)
 
 
 def test_the_arm_is_drawn_and_can_be_turned_with_the_keyboard(saved: Page) -> None:
@@ -196,6 +251,7 @@ def test_other_browsers_compute_and_draw_the_same(name: str, file: Path, tmp_pat
         for robot in (UR5, kin.get_robot("scara"), kin.get_robot("panda")):
             assert page.run(f"return ({WORST})(arguments[0])", question(robot, 10_000)) < 1e-12
         assert page.run("return document.querySelector('#no-scene').hidden")
-        page.click("document.querySelector('[data-do=next]')")
-        page.wait("document.querySelector('#posture').textContent.startsWith('1 of 8')")
+        page.wait("document.querySelectorAll('#postures button').length === 8")
+        page.click("document.querySelector('#postures li:nth-child(3) button')")
+        page.wait("document.querySelector('#postures li:nth-child(3) button').ariaPressed === 'true'")
         assert np.allclose(kin.fk(UR5, page.run("return kinboardArm.q()")), kin.fk(UR5, Q), atol=1e-9)
