@@ -136,6 +136,7 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         self._runner.end()
         if self.settings.overlay is not None:
             self.stage.see_through(False)
+            self._scene.remove()
         self.change(stopped=None, overlay=None)
         self.schedule()
 
