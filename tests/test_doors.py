@@ -42,7 +42,6 @@ GUARDED = {
     "app/service/web/access.py": "bytes",
     "app/service/web/embedding.py": "bytes of the head of a request",
     "app/service/web/inspection.py": "bytes and depth",
-    "app/service/web/lti.py": "bytes",
     "app/viewer/meshes/archive.py": "bytes and files before it is unpacked",
     "app/viewer/meshes/child.py": "a process of its own",
     "app/viewer/meshes/loading.py": "a process of its own",

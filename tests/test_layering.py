@@ -135,7 +135,7 @@ RULES: dict[str, set[str]] = {
         *("app.exercises", "app.service.web.rate_limit", "app.service.web.rooms", "app.shared"),
     },
     "app/service/web": {
-        *("starlette", "msgspec", "itsdangerous", "kin"),
+        *("anyio", "starlette", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.bench.board", "app.classroom", "app.service.web", "app.shared"),
     },
     "app/notebook": {
