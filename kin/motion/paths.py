@@ -18,7 +18,6 @@ from kin.motion.geometry.tables import corner_at
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import JointMotion
 from kin.motion.program import Circ, JointTarget, Lin, Move, Ptp, Spline, Target
-from kin.motion.scurve import shortest_time
 from kin.motion.timing.timed import JointPath, shortest
 from kin.robot import Robot
 from kin.transforms import Array
@@ -333,13 +332,13 @@ def stopping_times(limits: MotionLimits, moves: list[Move], run: Run, path: Join
     corners = np.array([len(owners) > 1 for owners in run.layout.owners])[_parts_of(run.layout, path.knots)]
     most = np.where(corners, _FREE, path.most)  # in a corner that is of both segments
     base = np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)
-    for k, (move, way) in enumerate(zip(moves, np.abs(np.diff(run.ends, axis=0)).tolist(), strict=True)):
+    for k, (move, start, end) in enumerate(zip(moves, run.ends[:-1], run.ends[1:], strict=True)):
         own = base * (move.speed, move.acceleration, move.acceleration if jerk else np.inf)
         part = slice(cuts[k], cuts[k + 1])
         rows = np.broadcast_to(own, path.limits[part].shape).copy()
         knots = path.knots[cuts[k] : cuts[k + 1] + 1]
         plain = shortest(JointPath(knots, path.joints[part], rows, most[part]))
-        least = max(shortest_time(d, *row) for d, row in zip(way, own.tolist(), strict=True))
+        least = JointMotion.between(start, end, own).duration
         free = move.tool_speed is None and move.tool_turn is None
         found.append(max(least, _with_jerk(plain, own) if jerk and free else plain))
     return found

@@ -51,7 +51,10 @@ class Hold:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointMotion:
-    """Each joint by itself, as cubic polynomials: `breaks` ``(n, 8)``, `pieces` ``(n, 7, 4)``."""
+    """Each joint by itself, as cubic polynomials: `breaks` ``(n, 8)``, `pieces` ``(n, 7, 4)``.
+
+    All of a PTP asks this class for durations and motions: what profile it has is known to `between` alone.
+    """
 
     breaks: Array
     pieces: Array

@@ -56,12 +56,6 @@ def whole(phases: Phases) -> float:
 
 
 @jit
-def shortest_time(distance: float, v: float, a: float, j: float) -> float:
-    """Seconds from rest to rest over a distance ≥ 0."""
-    return whole(phase_times(distance, v, a, j))
-
-
-@jit
 def fill(start: float, end: float, phases: Phases, total: float, breaks: Array, pieces: Array) -> None:
     """The motion of one joint, stretched to `total` seconds.
 

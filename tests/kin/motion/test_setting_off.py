@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import kin
-from kin.motion import moving, scurve
+from kin.motion import moving
+from kin.motion.pieces import JointMotion
 
 UR5 = kin.get_robot("ur5")
 HOME = UR5.q_home
@@ -53,7 +54,7 @@ def test_from_rest_it_is_the_fastest_motion_from_rest_to_rest():
     for q, goal, qd, _, limits in cases(150):
         if not qd.any():
             piece = moving.together(q, goal, qd, qd, limits)
-            least = max(scurve.shortest_time(abs(b - a), *row) for a, b, row in zip(q, goal, limits, strict=True))
+            least = JointMotion.between(q, goal, limits).duration
             assert piece.duration == pytest.approx(least, rel=1e-7, abs=1e-9)
 
 
