@@ -1,4 +1,4 @@
-"""Exceptions for invalid input.
+"""Exceptions for invalid input, and the checks of numbers and choices that raise them.
 
 A problem without a solution is not an error: it gives a result with a status and a reason. Invalid input raises.
 Every message names the field, the value and what would be valid, so it can be shown to people as it is.
@@ -6,6 +6,8 @@ Every message names the field, the value and what would be valid, so it can be s
 
 from __future__ import annotations
 
+import math
+from numbers import Integral, Real
 from reprlib import Repr
 
 
@@ -75,3 +77,26 @@ def shorten(value: object, length: int = 80) -> str:
 _REPR = Repr()
 _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = _REPR.maxset = 40
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = 200
+
+
+def finite_number(field: str, value: object, expected: str = "a finite number") -> float:
+    """A finite number as a float; raises `InputError` naming the field."""
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+    except OverflowError:  # an integer beyond the largest float
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(field, value, expected)
+    return number
+
+
+def whole_number(field: str, value: object, least: int, most: int) -> int:
+    """A whole number within bounds; raises `InputError` naming the field."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        raise InputError(field, value, f"a whole number from {least} to {most}")
+    return int(value)
+
+
+def one_of(*choices: str) -> str:
+    """What is valid where one of these texts is."""
+    return "one of " + ", ".join(f'"{choice}"' for choice in choices)

@@ -33,8 +33,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from kin.checks import finite_number, one_of
-from kin.errors import InputError
+from kin.errors import InputError, finite_number, one_of
 from kin.transforms import Array
 
 Kind = Literal["revolute", "prismatic", "fixed"]

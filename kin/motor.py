@@ -13,8 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from kin.checks import finite_number, one_of, whole_number
-from kin.errors import InputError
+from kin.errors import InputError, finite_number, one_of, whole_number
 
 MotorUnit = Literal["deg", "rad", "ticks", "range_m100_100", "range_0_100"]
 MOTOR_UNITS: tuple[MotorUnit, ...] = get_args(MotorUnit)

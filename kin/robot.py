@@ -24,8 +24,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kin.checks import finite_number, one_of
-from kin.errors import InputError
+from kin.errors import InputError, finite_number, one_of
 from kin.joint import DEFAULT_LIMITS as DEFAULT_LIMITS
 from kin.joint import (
     FOLLOWS,
@@ -422,10 +421,13 @@ class Robot:
             ca, sa = exact_cos_sin(row.alpha)
             body += [row.theta, row.d, row.a, ca, sa]
             if row.follows:
-                body += [KIND_CODES[row.kind] + FOLLOWS, indices[row.follows], row.ratio]
+                ratio = row.ratio
+                body += [KIND_CODES[row.kind] + FOLLOWS, indices[row.follows]]
             else:
-                body += [KIND_CODES[row.kind], float(q_index) if row.driven else -1.0, 0.0]
+                ratio = 1.0
+                body += [KIND_CODES[row.kind], float(q_index * row.driven)]
                 q_index += row.driven
+            body += [ratio * (row.kind == "revolute"), ratio * (row.kind == "prismatic")]
         return _frozen(header + body)
 
     @cached_property

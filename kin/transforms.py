@@ -272,10 +272,11 @@ def rotation_angle(R_a: Array, R_b: Array) -> float:
 
 
 def rotation_vector(R: Array) -> Array:
-    """The rotation vector ``(3,)`` of a rotation ``(3, 3)``."""
+    """The rotation vectors ``(..., 3)`` of rotations ``(..., 3, 3)``."""
     q = wxyz_from_rotation(R)
-    size = float(np.linalg.norm(q[1:]))
-    return np.zeros(3) if size == 0.0 else np.asarray(q[1:] / size * (2.0 * math.atan2(size, float(q[0]))))
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    return np.asarray(q[..., 1:] * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12))
 
 
 def vector_angle(a: Array, b: Array) -> float:

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.errors import InputError
-from kin.ik.options import finite_number
-from kin.motion.scurve import PHASES, fill, phase_times, whole
+from kin.errors import InputError, finite_number
+from kin.motion.pieces import JointMotion
 from kin.transforms import Array, finite_array
 
 
@@ -118,10 +117,8 @@ def s_curve(start: float, end: float, velocity: float, acceleration: float, jerk
     """The fastest from rest to rest under limits of velocity, acceleration and jerk."""
     q0, q1 = _finite(start=start, end=end)
     limits = [_positive("velocity", velocity), _positive("acceleration", acceleration), _positive("jerk", jerk)]
-    breaks, pieces = np.empty(PHASES + 1), np.empty((PHASES, 4))
-    phases = phase_times(abs(q1 - q0), *limits)
-    fill(q0, q1, phases, whole(phases), breaks, pieces)
-    return Profile(breaks, np.concatenate([pieces, np.zeros((PHASES, 2))], axis=1))
+    motion = JointMotion.between(np.array([q0]), np.array([q1]), np.array([limits]))
+    return Profile(motion.breaks[0], np.pad(motion.pieces[0], ((0, 0), (0, 2))))
 
 
 def _finite(**values: float) -> list[float]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.codegen import entries
 from kin.codegen.families import Alone, alone, refused
 from kin.codegen.rooms import Rooms
@@ -20,7 +21,6 @@ from kin.kernels.fk import fk_one
 from kin.kernels.jacobian import jacobian_one
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.common import TURN
 from kin.solvers.contract import POSE, ClosedForm, RedundancyParameter
 from kin.solvers.numeric import spread
 from kin.transforms import Array

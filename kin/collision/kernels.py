@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.fk import advance, x_part, z_part
+from kin.kernels.fk import advance, base_rows, x_part, z_part
 from kin.transforms import Array
 
 TINY = 1e-24  # m²; a shorter segment is a point
@@ -69,9 +69,7 @@ def _put(shape: Array, k: int, r: int, x: float, y: float, z: float, p: float, o
 def place(model: Array, rows: Ints, shape: Array, q: Array, out: Array) -> None:
     """out ← starts and ends ``(m, 6)`` of the capsules at q; `rows` ascends."""
     k = 0
-    x0, y0, z0, p0 = model[3], model[4], model[5], model[6]
-    x1, y1, z1, p1 = model[7], model[8], model[9], model[10]
-    x2, y2, z2, p2 = model[11], model[12], model[13], model[14]
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, 0)
     modified = model[2] == 1.0
     for i in range(-1, int(model[0])):
         if i >= 0:

@@ -18,6 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from kin.angles import wrapped
 from kin.axes import generic_q
 from kin.comparison.bound import Zeros
 from kin.comparison.frames import FRAME, LEAST, Mapping, Reference, Side, no_mapping
@@ -355,7 +356,7 @@ def _from_poses(lines: Chain, goal: Array, tolerance: Tolerance) -> Iterator[tup
         turn = np.arctan2((direction * axis[:, :, None]).sum(axis=-1), cosine[:, :, None])  # (N, Q, m)
         turned = turn[:, 0]
         # The line stays where it is, and the turn is the same at all configurations.
-        same = np.abs(np.remainder(turn - turned[:, None] + math.pi, 2.0 * math.pi) - math.pi).max(axis=1)
+        same = np.abs(wrapped(turn - turned[:, None])).max(axis=1)
         moved = np.einsum("nqij,nqmj->nqmi", R, direction) - direction
         shifted = np.einsum("nqij,nqmj->nqmi", R, point - p_t[:, :, None]) + p_a[:, None] - point
         off = np.maximum(np.abs(moved).max(axis=(1, 3)), np.abs(shifted).max(axis=(1, 3)))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 
+from kin.angles import TURN
 from kin.doctor.notes import FindingLog, cut, spelled
 from kin.doctor.source import Edit
 from kin.files.numbers import LARGEST, number_of
@@ -16,7 +17,6 @@ from kin.units import general
 
 REQUIRED = ("velocity", "effort")
 PEAKS = (*REQUIRED, "acceleration", "deceleration", "jerk")
-TURN = 2.0 * math.pi
 DEGREE = math.pi / 180.0
 _MOST_TURNS = 2.0 * TURN + 0.01  # limits of a joint in radians are seldom beyond two turns
 _MOST_DEGREES = 1080.0

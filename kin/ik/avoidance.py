@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import TURN
 from kin.collision.contacts import Surroundings, surroundings
 from kin.ik import preferences
 from kin.ik.assembly import make_result
@@ -22,7 +23,6 @@ from kin.ik.details import RollError, RotationError, Solved, Touching
 from kin.ik.problem import IKProblem
 from kin.ik.results import Cause, IKResult, Status
 from kin.singularity import singularities_at
-from kin.solvers.common import TURN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.fk import fk
 from kin.ik.candidates import DISTANCE, ROLL, Rows, accept, measure_rows, ranges, select, unchecked
 from kin.ik.candidates import Flags as Flags
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
-from kin.solvers.common import TURN
 from kin.solvers.contract import (
     APPROACH,
     Candidates,

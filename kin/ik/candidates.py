@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import TURN, nearest_image, wrap
 from kin.kernels.compile import MODEL, direct, inlined, jit, record, row_of
 from kin.kernels.fk import fk_into, fk_many
-from kin.solvers.common import TURN, nearest_image, wrap
 from kin.solvers.contract import APPROACH, MASK, POSE
 from kin.solvers.numeric.error import relative_pose
 from kin.tolerances import TOLERANCES

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.axes import size
 from kin.fk import fk
 from kin.ik.branches import Flags, measure, solution, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROTATION_ERROR
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
-from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric import each_of, solve, spread
 from kin.solvers.numeric.error import Goal

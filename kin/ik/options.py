@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from kin.collision.obstacles import Obstacle, checked_obstacles
 from kin.differential.task import Task
-from kin.errors import InputError
+from kin.errors import InputError, finite_number
 from kin.robot import Robot
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION, TASK_CODES
 from kin.tolerances import TOLERANCES
@@ -339,19 +339,6 @@ class IKOptions:
         name = next(name for name, value in TASK_CODES.items() if value == code)
         weights = [*(float(flag) for flag in self.mask), float(self.mask_frame == "base")]
         return Coordinates(name, code, np.array(weights))
-
-
-def finite_number(field: str, value: object, expected: str) -> float:
-    """One finite number as a float; raises `InputError` naming `field`."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise InputError(field, value, expected)
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise InputError(field, value, expected)
-    return number
 
 
 class MotionKeywords(TypedDict, total=False):

@@ -14,11 +14,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import wrap
 from kin.ik.branches import Branches, Flags, candidates_of, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import IKProblem
 from kin.kernels import jacobian as jacobian_kernels
-from kin.solvers.common import wrap
 from kin.solvers.contract import POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

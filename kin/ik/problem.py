@@ -15,6 +15,7 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.angles import TURN
 from kin.differential.metric import weights
 from kin.errors import InputError
 from kin.ik.candidates import Requirement, Whole
@@ -23,7 +24,6 @@ from kin.ik.options import IKOptions, shape_of
 from kin.kernels.checks import straighten, straighten_many
 from kin.kernels.compile import direct
 from kin.robot import Robot
-from kin.solvers.common import TURN
 from kin.solvers.contract import POSITION, ClosedForm, RedundancyParameter
 from kin.solvers.locked import form_with_locked
 from kin.solvers.scaled import unit_of

@@ -7,9 +7,12 @@ is one flat float64 array (`Robot.model`):
 ``model[0:3]``        number of rows, number of joints, 1.0 if the convention is modified
 ``model[3:15]``       base transform, three rows of four
 ``model[15:27]``      tool transform, three rows of four
-``model[27+8i: …]``   row i: θ, d, a, cos α, sin α, kind (0 fixed, 1 revolute, 2 prismatic, 3 and 4 the
-                      same of a row that follows a joint), index into q, ratio (of one that follows)
+``model[27+9i: …]``   row i: θ, d, a, cos α, sin α, kind (0 fixed, 1 revolute, 2 prismatic, 3 and 4 the
+                      same of a row that follows a joint), index into q, and by how much θ and d
+                      change with that joint value: 1, the ratio of a row that follows, or 0
 ====================  =======================================================================
+
+All kernels read rows by :func:`z_row` and :func:`x_part`.
 
 A row is applied as two plane rotations of the columns of the running pose instead of a 4×4 product: a rotation
 about z mixes the x and y columns, one about x mixes y and z, and a translation adds a multiple of a column.
@@ -35,7 +38,7 @@ _SIN, _COS, _D, _ANGLE, _T0, _T1, _T2, _T3, _T4, _T5, _T6, _T7, _T8, _T9, _T10, 
     0, 17 * BLOCK, BLOCK
 )
 HEADER = 27
-WIDTH = 8
+WIDTH = 9
 
 
 @inlined
@@ -119,22 +122,24 @@ def advance(row: Row, s: float, c: float, d: float, a: float, ca: float, sa: flo
 
 
 @inlined
+def kind_of(model: Array, i: int) -> float:
+    """The kind of row i."""
+    return float(model[HEADER + WIDTH * i + 5])
+
+
+@inlined
+def z_row(model: Array, i: int) -> tuple[float, float, int, float, float]:
+    """(θ, d, index into q, turn, slide) of row i: it turns by θ + turn q, and slides by d + slide q."""
+    k = HEADER + WIDTH * i
+    return model[k], model[k + 1], int(model[k + 6]), model[k + 7], model[k + 8]
+
+
+@inlined
 def z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
     """(sin θ, cos θ, d) of row i."""
-    k = HEADER + WIDTH * i
-    theta = model[k]
-    d = model[k + 1]
-    kind = model[k + 5]
-    if kind == 1.0:
-        theta += q[int(model[k + 6])]
-    elif kind == 2.0:
-        d += q[int(model[k + 6])]
-    elif kind == 3.0:
-        theta += model[k + 7] * q[int(model[k + 6])]
-    elif kind == 4.0:
-        d += model[k + 7] * q[int(model[k + 6])]
-    s, c = sine_cosine(theta)
-    return s, c, d
+    theta, d, j, turn, slide = z_row(model, i)
+    s, c = sine_cosine(theta + turn * q[j])
+    return s, c, d + slide * q[j]
 
 
 @jit
@@ -194,17 +199,9 @@ def fk_into(model: Array, q: Array, T: Array) -> None:
     ahead = 0 if model[2] == 0.0 else 1
     x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, ahead)
     for i in range(int(model[0])):
-        k = HEADER + WIDTH * i
-        theta, d = model[k], model[k + 1]
-        if model[k + 5] == 1.0:
-            theta += q[int(model[k + 6])]
-        elif model[k + 5] == 2.0:
-            d += q[int(model[k + 6])]
-        elif model[k + 5] == 3.0:
-            theta += model[k + 7] * q[int(model[k + 6])]
-        elif model[k + 5] == 4.0:
-            d += model[k + 7] * q[int(model[k + 6])]
-        # `z_part` expanded by hand: a call would double the time of the loop.
+        theta, d, j, turn, slide = z_row(model, i)
+        theta, d = theta + turn * q[j], d + slide * q[j]
+        # `sine_cosine` expanded by hand: a call would double the time of the loop.
         if abs(theta) <= WIDE:
             s, c = sin_cos(theta)
         else:
@@ -228,19 +225,13 @@ def fk_one(model: Array, q: Array, T: Array) -> bool:
 @inlined
 def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Array) -> int:
     """S ← sin θ, cos θ, d of row i for a block of configurations; returns how many values are not finite."""
-    k = HEADER + WIDTH * i
-    theta, d, kind, j = model[k], model[k + 1], model[k + 5], int(model[k + 6])
+    theta, d, j, turn, slide = z_row(model, i)
     widest()
     wide = 0
     bad = 0
-    ratio = model[k + 7]
-    if kind == 1.0 or kind == 3.0:
-        if kind == 1.0:
-            for b in range(count):
-                S[_ANGLE + b] = theta + q[first + b, j]
-        else:
-            for b in range(count):
-                S[_ANGLE + b] = theta + ratio * q[first + b, j]
+    if turn != 0.0:
+        for b in range(count):
+            S[_ANGLE + b] = theta + turn * q[first + b, j]
         for b in range(count):
             angle = S[_ANGLE + b]
             wide += 0 if abs(angle) <= WIDE else 1
@@ -258,7 +249,7 @@ def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Arra
         for b in range(count):
             S[_SIN + b] = s
             S[_COS + b] = c
-            S[_D + b] = d + (q[first + b, j] if kind == 2.0 else ratio * q[first + b, j] if kind == 4.0 else 0.0)
+            S[_D + b] = d + slide * q[first + b, j]
             bad += 0 if abs(S[_D + b]) < math.inf else 1
     return bad
 

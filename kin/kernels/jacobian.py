@@ -15,7 +15,8 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.kernels.fk import HEADER, WIDTH, advance, apply_tool, base_rows, x_part, z_part
+from kin.kernels.dense import volume
+from kin.kernels.fk import advance, apply_tool, base_rows, kind_of, sine_cosine, x_part, z_row
 from kin.transforms import Array
 
 
@@ -29,15 +30,16 @@ def jacobian_into(model: Array, q: Array, J: Array, T: Array, axes: Array) -> No
     follows = False
     x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, ahead)
     for i in range(int(model[0])):
-        k = HEADER + WIDTH * i
-        j = int(model[k + 6])
-        if model[k + 5] > 2.0:
+        theta, d, j, turn, slide = z_row(model, i)
+        kind = kind_of(model, i)
+        if kind > 2.0:
             follows = True
-        elif j >= 0:
+        elif kind > 0.0:
             axes[j, 0], axes[j, 1], axes[j, 2] = z0, z1, z2
             axes[j, 3], axes[j, 4], axes[j, 5] = p0, p1, p2
-            axes[j, 6] = model[k + 5]
-        s, c, d = z_part(model, i, q)
+            axes[j, 6] = kind
+        s, c = sine_cosine(theta + turn * q[j])
+        d += slide * q[j]
         a, ca, sa = x_part(model, i + ahead)
         x0, y0, z0, p0 = advance((x0, y0, z0, p0), s, c, d, a, ca, sa)
         x1, y1, z1, p1 = advance((x1, y1, z1, p1), s, c, d, a, ca, sa)
@@ -70,21 +72,17 @@ def _add_followers(model: Array, q: Array, J: Array, T: Array) -> None:
     ahead = 0 if model[2] == 0.0 else 1
     x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, ahead)
     for i in range(int(model[0])):
-        k = HEADER + WIDTH * i
-        j, ratio = int(model[k + 6]), model[k + 7]
-        if model[k + 5] == 3.0:
+        theta, d, j, turn, slide = z_row(model, i)
+        if kind_of(model, i) > 2.0:
             rx, ry, rz = T[0, 3] - p0, T[1, 3] - p1, T[2, 3] - p2
-            J[0, j] += ratio * (z1 * rz - z2 * ry)
-            J[1, j] += ratio * (z2 * rx - z0 * rz)
-            J[2, j] += ratio * (z0 * ry - z1 * rx)
-            J[3, j] += ratio * z0
-            J[4, j] += ratio * z1
-            J[5, j] += ratio * z2
-        elif model[k + 5] == 4.0:
-            J[0, j] += ratio * z0
-            J[1, j] += ratio * z1
-            J[2, j] += ratio * z2
-        s, c, d = z_part(model, i, q)
+            J[0, j] += turn * (z1 * rz - z2 * ry) + slide * z0
+            J[1, j] += turn * (z2 * rx - z0 * rz) + slide * z1
+            J[2, j] += turn * (z0 * ry - z1 * rx) + slide * z2
+            J[3, j] += turn * z0
+            J[4, j] += turn * z1
+            J[5, j] += turn * z2
+        s, c = sine_cosine(theta + turn * q[j])
+        d += slide * q[j]
         a, ca, sa = x_part(model, i + ahead)
         x0, y0, z0, p0 = advance((x0, y0, z0, p0), s, c, d, a, ca, sa)
         x1, y1, z1, p1 = advance((x1, y1, z1, p1), s, c, d, a, ca, sa)
@@ -114,49 +112,23 @@ def jacobian_many(model: Array, q: Array) -> Array:
 
 
 @jit
-def volume_of(A: Array) -> float:
-    """Product of the singular values of A ``(m, k)``, m ≥ k, by Householder QR; A is overwritten."""
-    m, k = A.shape
-    product = 1.0
-    for j in range(k):
-        scale = 0.0
-        for i in range(j, m):
-            scale = max(scale, abs(A[i, j]))
-        if scale == 0.0:
-            return 0.0
-        norm2 = 0.0
-        for i in range(j, m):
-            A[i, j] /= scale
-            norm2 += A[i, j] * A[i, j]
-        norm = math.sqrt(norm2)
-        product *= norm * scale
-        head = A[j, j]
-        pivot = head + math.copysign(norm, head)
-        A[j, j] = pivot
-        half = norm2 + abs(head) * norm
-        for c in range(j + 1, k):
-            dot = 0.0
-            for i in range(j, m):
-                dot += A[i, j] * A[i, c]
-            dot /= half
-            for i in range(j, m):
-                A[i, c] -= dot * A[i, j]
-    return product
+def manipulability_of(J: Array, first: int, last: int, A: Array) -> float:
+    """Product of the singular values of rows first…last−1 of J ``(6, n)``; A ``(larger, smaller)`` is scratch."""
+    n = J.shape[1]
+    for r in range(last - first):
+        for c in range(n):
+            if last - first > n:
+                A[r, c] = J[first + r, c]
+            else:
+                A[c, r] = J[first + r, c]
+    return volume(A)
 
 
 @jit
 def manipulability_many(J: Array, first: int, last: int) -> Array:
     """Product of the singular values of rows first…last−1 of Jacobians ``(k, 6, n)``: ``(k,)``."""
-    rows = last - first
-    n = J.shape[2]
-    out = np.empty(J.shape[0])
-    tall = np.empty((max(rows, n), min(rows, n)))
+    rows, n = last - first, J.shape[2]
+    out, A = np.empty(J.shape[0]), np.empty((max(rows, n), min(rows, n)))
     for i in range(J.shape[0]):
-        for r in range(rows):
-            for c in range(n):
-                if rows > n:
-                    tall[r, c] = J[i, first + r, c]
-                else:
-                    tall[c, r] = J[i, first + r, c]
-        out[i] = volume_of(tall)
+        out[i] = manipulability_of(J[i], first, last, A)
     return out

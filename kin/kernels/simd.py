@@ -29,8 +29,8 @@ from kin.kernels.compile import PLAIN, inlined
 _build: Callable[[Any], Any] = intrinsic  # decorator for functions that emit LLVM instructions
 
 WIDE = 1e5  # rad; up to here the error of subtracting k·π/2 is negligible
-TURN = 2.0 * math.pi
 
+_TURN = 2.0 * math.pi
 _ROUND = 6755399441055744.0  # 1.5 · 2⁵²: adding it leaves a float rounded to an integer, k in its low bits
 _HALF_PI = 1.5707963267948966
 _HALF_PI_REST = 6.123233995736766e-17
@@ -175,8 +175,8 @@ def rounded(x: float) -> float:
 @inlined
 def wrapped(angle: float) -> float:
     """An angle wrapped to (−π, π]; the argument may be at most one turn outside."""
-    down = angle - TURN
-    up = angle + TURN
+    down = angle - _TURN
+    up = angle + _TURN
     angle = down if angle > math.pi else angle
     return up if angle <= -math.pi else angle
 

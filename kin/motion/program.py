@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.differential.task import Task
-from kin.errors import InputError
-from kin.ik.options import finite_number, shape_of
+from kin.errors import InputError, finite_number
+from kin.ik.options import shape_of
 from kin.poses import check_length
 from kin.transforms import Array, as_transform, pose_from_position_wxyz, wxyz_from_rotation
 

@@ -29,11 +29,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.errors import InputError, shorten
+from kin.errors import InputError, finite_number, shorten
 from kin.files.numbers import scaled
 from kin.files.read import ANGLES, is_path
 from kin.frames import BASE, WORLD
-from kin.ik.options import finite_number
 from kin.motion.program import (
     KINDS,
     MOST_POINTS,

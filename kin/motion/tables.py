@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kin.errors import InputError
-from kin.ik.options import finite_number
+from kin.errors import InputError, finite_number
 from kin.transforms import Array, wxyz_from_rotation
 
 AT_ONCE = 500  # samples of a piece, so that a long motion is never in memory as text

@@ -13,13 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.angles import images_near
 from kin.errors import InputError
 from kin.motor import CALIBRATED, Motor, checked_motors, fit_joints
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
-
-_TURN = 2.0 * math.pi
 
 
 def moving_motors(robot: Robot, motors: Sequence[Motor] | None = None) -> tuple[Motor, ...]:
@@ -110,7 +109,7 @@ def joint_values(robot: Robot, j: int, motor: Motor, readings: Array) -> Array:
         return values
     low, high = robot.lower[j], robot.upper[j]
     middle = 0.5 * (low + high) if math.isfinite(low + high) else 0.0
-    nearest = values - _TURN * np.round((values - middle) / _TURN)
+    nearest = images_near(values, middle)
     return np.where((values >= low) & (values <= high) & np.isfinite(low + high), values, nearest)
 
 

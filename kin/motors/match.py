@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.angles import TURN, images_near
 from kin.errors import InputError
 from kin.motor import Motor, MotorUnit
 from kin.motors.findings import MotorFinding, MotorMatch
@@ -32,7 +33,6 @@ _SLIDE = 0.15  # the same for a slide, relative to the way that it moves
 _CLEARER = 2.0  # times as far from the right zero are the readings with the wrong sign, or more
 _SAME_SCALE = 0.1  # relative difference of two scales that may be the same one
 _STILL = 0.2  # share of the joint's way below which a reading has not changed
-_TURN = 2.0 * math.pi
 _OTHER_UNITS: tuple[MotorUnit, ...] = ("deg", "rad", "ticks")
 
 
@@ -115,7 +115,7 @@ class _Look:
         made = MotorFinding(motor, "matched", None, tuple(better.error.tolist()), moved, read)
         slack = self._slack(motor, q)
         if worse.worst <= slack or (better.worst <= slack and worse.worst < _CLEARER * better.worst):
-            half = moved > 0.25 * _TURN and motor.lead is None
+            half = moved > 0.25 * TURN and motor.lead is None
             return replace(made, status="undecided", cause="half turn" if half else "still")
         if better.worst <= slack:
             zero = _tidy(motor, better.zero * motor.scale)
@@ -194,7 +194,7 @@ def _fit(motor: Motor, sign: int, differences: Array) -> _Fit:
 
 def _wrapped(motor: Motor, values: Array) -> Array:
     """Differences without whole turns, where readings begin again."""
-    return values - _TURN * np.round(values / _TURN) if motor.begins_again else values
+    return images_near(values) if motor.begins_again else values
 
 
 def _slope(q: Array, r: Array) -> float:

@@ -29,8 +29,8 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.errors import InputError
-from kin.ik.options import IKOptions, PathKeywords, finite_number, options_of_call
+from kin.errors import InputError, finite_number
+from kin.ik.options import IKOptions, PathKeywords, options_of_call
 from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
 from kin.named import robot_of
 from kin.path.details import JumpCause

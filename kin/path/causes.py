@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.fk import fk
 from kin.ik.branches import Flags, is_closed, measure, violations_of
 from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
@@ -39,7 +40,6 @@ from kin.path.search import DeadEnd
 from kin.path.waypoints import LayerSequence, PathSettings, has_closed_form
 from kin.robot import Robot
 from kin.singularity import Singularity, singularities
-from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, rotation_from_wxyz, wxyz_from_rotation

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.fk import jacobian
 from kin.ik import nearest
 from kin.ik.avoidance import is_free
@@ -15,7 +16,6 @@ from kin.ik.branches import Branches, Flags, is_closed, measure, solve_branches
 from kin.ik.candidates import OVERRUN, POSITION_ERROR, ROLL, ROTATION_ERROR, select
 from kin.ik.problem import IKProblem
 from kin.path.waypoints import WIDE, LayerSequence, PathSettings, has_closed_form
-from kin.solvers.common import TURN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from kin.angles import images_near
 from kin.fk import jacobian
 from kin.path.configurations import distinct, near_solutions, with_images
 from kin.path.waypoints import LayerSequence, has_closed_form
 from kin.robot import Robot
-from kin.solvers.common import TURN
 from kin.transforms import Array
 
 _SINGULAR = 1e-8  # of the product of the columns' lengths: below this a Jacobian is singular
@@ -47,6 +47,6 @@ def _any_singular(robot: Robot, q: Array) -> bool:
 
 def _once(robot: Robot, q: Array) -> Array:
     """The configurations ``(m, n)``, one of those that are whole turns apart."""
-    turned = np.where(robot.revolute, q - TURN * np.round(q / TURN), q)
+    turned = np.where(robot.revolute, images_near(q), q)
     kept = np.unique(turned.round(7), axis=0, return_index=True)[1]
     return np.asarray(turned[np.sort(kept)[:_MOST]])

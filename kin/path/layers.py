@@ -16,13 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.ik.answers import answer
 from kin.ik.branches import Branches
 from kin.ik.problem import IKProblem
 from kin.ik.results import Status
 from kin.path.configurations import branches_near, descended, distinct, meeting, pool, with_images
 from kin.path.waypoints import Waypoint, is_sampled
-from kin.solvers.common import wrap
 from kin.solvers.contract import APPROACH, POSE, SolverInput
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

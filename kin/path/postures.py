@@ -24,6 +24,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import TURN
 from kin.collision.contacts import Contact
 from kin.ik.avoidance import around
 from kin.ik.branches import violations_of
@@ -37,7 +38,6 @@ from kin.path.viterbi import first_from
 from kin.path.waypoints import PathSettings, Waypoint, has_closed_form
 from kin.robot import Robot
 from kin.singularity import singularities_at
-from kin.solvers.common import TURN
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units

@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.path.configurations import continued, nearest_solution, pool, with_images
 from kin.path.crossings import with_crossings
 from kin.path.layers import sampled
 from kin.path.smoothing import smoothed
 from kin.path.viterbi import Trellis, shortest
 from kin.path.waypoints import GRID, LayerSequence, PathSettings, is_sampled
-from kin.solvers.common import TURN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

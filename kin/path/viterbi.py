@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.kernels.compile import jit
 from kin.path.waypoints import PathSettings
-from kin.solvers.common import TURN
 from kin.transforms import Array
 
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.differential.metric import weights
 from kin.ik.details import JointKind
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
 from kin.path.details import JointMove
-from kin.solvers.common import TURN
 from kin.solvers.contract import POSITION
 from kin.transforms import Array
 

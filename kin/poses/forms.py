@@ -13,8 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.checks import one_of
-from kin.errors import InputError
+from kin.errors import InputError, one_of
 from kin.poses import rotations
 from kin.poses.rotations import Notation
 from kin.transforms import Array, as_transform

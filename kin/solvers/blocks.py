@@ -25,9 +25,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.fk import BLOCK, all_finite_pose
-from kin.kernels.simd import TURN, atan2, rounded, widest, wrapped
+from kin.kernels.simd import atan2, rounded, widest, wrapped
 from kin.solvers.common import HIGH, LOW, NEAR
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

@@ -21,9 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.axes import inverse, screw_z
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, NEAR, TURN, UNBOUNDED
+from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED
 from kin.solvers.contract import SolverInput
 from kin.transforms import Array
 

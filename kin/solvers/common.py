@@ -1,12 +1,11 @@
-"""Kernels that the closed forms share: angles of a rotation, sums of two angles, limits, and feasible arcs.
+"""Kernels that the closed forms share: angles of a rotation, sums of two angles, and feasible arcs.
 
-Three ideas are common to all families:
+Two ideas are common to all families:
 
 - **Z-Y-Z with a known first angle.** A rotation ``Rz(A) Ry(B) Rz(C)`` gives A from its third column up to the
   sign of sin B. B and C are then computed *given* A, so that the product reproduces the rotation to rounding
   error however small sin B is. Only where sin B vanishes is A free; then only A ± C matters, and the sum
   is split as near the seed as the limits allow.
-- **Images.** A joint whose limits span more than a turn has several values θ + 2πk for one configuration in space.
 - **Arcs.** If a rotation depends on a free angle ψ as ``M0 + M1 cos ψ + M2 sin ψ``, the values of ψ where one
   of its three angles meets a limit are roots of ``a cos ψ + b sin ψ + c = 0``. Between neighbouring roots
   nothing changes, so one test per arc decides it: the feasible set is exact, not sampled (Shimizu et al., IEEE
@@ -19,14 +18,13 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, excess, wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-TURN = 2.0 * math.pi
-_PER_TURN = 1.0 / TURN
 UNBOUNDED = 1e6  # of a limit that never binds
 NEAR, LOW, HIGH = range(3)  # rows of a box: seed and joint limits
 _SINGULAR = TOLERANCES.singular
@@ -36,49 +34,9 @@ _INSET = TOLERANCES.interval_inset
 
 
 @jit
-def wrap(angle: float) -> float:
-    """The same angle in (−π, π]."""
-    return angle - TURN * math.ceil((angle - math.pi) / TURN)
-
-
-@jit
 def merged(angle: float) -> float:
     """0.0 for an angle below `TOLERANCES.merge`, which is rounding error under the root of a double solution."""
     return 0.0 if angle < _MERGE else angle
-
-
-@jit
-def nearest_image(x: float, near: float, low: float, high: float) -> float:
-    """The image x + 2πk closest to `near` among those inside [low, high], else the least far outside."""
-    y = x + TURN * float(np.round((near - x) * _PER_TURN))
-    if y - high > _LIMIT:
-        turns = math.floor((high + _LIMIT - x) / TURN)
-        below = x + TURN * turns
-        if below - high > _LIMIT:  # the quotient was rounded up to a whole number
-            below = x + TURN * (turns - 1.0)
-        if low - below <= _LIMIT or low - below < below + TURN - high:
-            return below
-        return below + TURN
-    if low - y > _LIMIT:
-        turns = math.ceil((low - _LIMIT - x) / TURN)
-        above = x + TURN * turns
-        if low - above > _LIMIT:
-            above = x + TURN * (turns + 1.0)
-        if above - high <= _LIMIT or above - high < low - (above - TURN):
-            return above
-        return above - TURN
-    return y
-
-
-@jit
-def excess(x: float, low: float, high: float) -> float:
-    """How far the best image of the angle x is outside [low, high]; 0.0 inside (with the limit slack)."""
-    y = nearest_image(x, 0.5 * (low + high), low, high)
-    if y < low - _LIMIT:
-        return low - y
-    if y > high + _LIMIT:
-        return y - high
-    return 0.0
 
 
 @jit
@@ -281,7 +239,7 @@ def extend_arcs(arcs: Array, first: int, found: int, branch: int, probes: Array,
         low, high = probes[j], probes[j]
     else:
         low = probes[j - 1]
-        high = probes[j + 1] if j + 1 < n else probes[0] + 2.0 * math.pi
+        high = probes[j + 1] if j + 1 < n else probes[0] + TURN
     if found > first and low <= arcs[found - 1, 2]:
         arcs[found - 1, 2] = max(high, arcs[found - 1, 2])
         return found

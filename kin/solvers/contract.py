@@ -13,16 +13,18 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import apart
+from kin.fk import fk, jacobian
 from kin.kernels.compile import counted, direct
 from kin.robot import Robot
 from kin.solvers.names import Names
-from kin.solvers.singular import Singularity
+from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
 POSE, APPROACH, POSITION, MASK = 0, 1, 2, 3
@@ -146,17 +148,28 @@ class BatchKernels:
             a singular target leaves free.
         many: ``many(params, T (N, 4, 4), values (N,) or (1,), near (n,), out (N, branches, n))``: one value per
             target, or one for all.
+        seeded: ``seeded(params, T (N, 4, 4), seeds, lower, upper, out (N, branches, n))``, see
+            `ClosedForm.solve_many`; None for families that are quick for no task.
     """
 
     params: Array
     one: One
     many: Many
+    seeded: Callable[[Array, Array, Array, Array, Array, Array], None] | None = field(default=None, kw_only=True)
 
     def unchecked(self) -> BatchKernels:
         """The same without type dispatch, see `kin.kernels.compile.direct`; `one` raises `TypeError`."""
         # `many` shares the machine code of calls with dispatch, which takes longer to compile than is saved here.
         many = direct(self.many, *map(counted, (1, 3, 1, 1, 3)))
         return replace(self, one=direct(self.one, 1, (4, 4), float, 1, 2), many=many)
+
+
+class PlainKernels(BatchKernels):
+    """Batch kernels that are not compiled, so that there is nothing to unwrap."""
+
+    def unchecked(self) -> BatchKernels:
+        """The same."""
+        return self
 
 
 def weakest(*known: Completeness) -> Completeness:
@@ -173,6 +186,7 @@ class ClosedForm(ABC):
     """The closed form of one arm.
 
     Attributes:
+        robot: the arm, for families that leave `branch_of` or `singularities` as they are here.
         name, title: id of the family, and the same for people.
         branches: names, one per row of its answers.
         meanings: (part of a name, what it says), for every part of the names.
@@ -187,6 +201,7 @@ class ClosedForm(ABC):
         quick: the tasks whose targets take some microseconds each: `solve_many` serves these.
     """
 
+    robot: Robot
     name: str
     title: str
     branches: tuple[str, ...]
@@ -226,7 +241,9 @@ class ClosedForm(ABC):
             seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.
             lower, upper: ``(n,)`` joint limits, which count.
         """
-        raise NotImplementedError(f"{self.name} is quick for no task")
+        if self.kernels.seeded is None:
+            raise NotImplementedError(f"{self.name} is quick for no task")
+        self.kernels.seeded(self.kernels.params, T, seeds, lower, upper, q)
 
     def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """q ``(N, n)`` ← the row of `solve_many` nearest to the seed inside the limits, in less time; or NaN.
@@ -265,10 +282,41 @@ class ClosedForm(ABC):
         """
         return math.nan
 
-    @abstractmethod
     def branch_of(self, q: Array) -> int:
-        """The branch that a configuration ``(n,)`` is on: a row of `branches`."""
+        """The branch that a configuration ``(n,)`` is on: a row of `branches`.
 
-    @abstractmethod
+        Here, for rows without names, the one nearest to it among all configurations of its pose.
+        """
+        rows = np.empty((len(self.branches), self.robot.n))
+        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, np.array(q, dtype=np.float64), rows)
+        off = apart(rows, q, self.robot.revolute)
+        return int(np.argmin(np.where(np.isnan(off), math.inf, off)))
+
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """The singularities that a configuration ``(n,)`` is no farther from than `within`, in no order."""
+        """The singularities that a configuration ``(n,)`` is no farther from than `within`, in no order.
+
+        Here, where they have no simple form, the smallest singular value of the Jacobian of a pose.
+        """
+        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))
+
+
+class WrappedForm(ClosedForm):
+    """A closed form that asks another one; what is here is as that one has it.
+
+    Attributes:
+        form: that one.
+    """
+
+    form: ClosedForm
+
+    def handles(self, task: int) -> bool:
+        """The tasks of the form."""
+        return self.form.handles(task)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """Those of the form; a parameter that is a joint value is that of the arm's own joint."""
+        return self.form.redundancies(task)
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """Those of the form."""
+        return self.form.singularities(q, within)

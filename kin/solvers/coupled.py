@@ -21,11 +21,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import TURN, images_near
 from kin.axes import is_zero
 from kin.differential.task import natural_task, task_jacobian, usual_rank
 from kin.fk import jacobian
 from kin.robot import Joint, Robot
-from kin.solvers.common import TURN, UNBOUNDED
+from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import POSE, Candidates, ClosedForm, RedundancyParameter, SolverInput
 from kin.solvers.reduced import held
 from kin.solvers.reversed import kernels_by_solving
@@ -130,10 +131,10 @@ class Coupled(ClosedForm):
         t = found.q
         q = t[:, self._chosen] @ self._back.T
         apart = t - q @ self._A.T
-        apart = np.where(self.free.revolute, apart - TURN * np.round(apart / TURN), apart)
+        apart = np.where(self.free.revolute, images_near(apart), apart)
         possible = np.abs(apart).max(axis=1) < _APART  # NaN is not
         completeness = found.completeness if self._is_isolated(t) else "unknown"
-        q = np.where(possible[:, None], np.where(self.robot.revolute, q - TURN * np.round(q / TURN), q), math.nan)
+        q = np.where(possible[:, None], np.where(self.robot.revolute, images_near(q), q), math.nan)
         return Candidates(q, np.empty((len(q), 0)), (), found.gap, found.obstacle, completeness)
 
     def _is_isolated(self, t: Array) -> bool:

@@ -21,11 +21,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import wrap, wrapped
 from kin.axes import size
 from kin.kernels.compile import MODEL, direct, jit, row_of
+from kin.kernels.dense import least_pivot, singular_values
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
-from kin.solvers.common import wrap
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric.error import relative_pose
 from kin.transforms import Array
@@ -96,34 +97,6 @@ def _linear(model: Array, T: Array, task: int, size: float, free: Whole, q: Arra
 
 
 @jit
-def _least_pivot(J: Array) -> float:
-    """The last pivot of J ``(6, k)`` by orthogonalisation with column pivoting; J is overwritten."""
-    k = J.shape[1]
-    least = math.inf
-    for i in range(k):
-        best, largest = i, -1.0
-        for j in range(i, k):
-            square = 0.0
-            for r in range(6):
-                square += J[r, j] * J[r, j]
-            if square > largest:
-                best, largest = j, square
-        if largest == 0.0:
-            return 0.0
-        least = math.sqrt(largest)
-        for r in range(6):
-            J[r, i], J[r, best] = J[r, best], J[r, i]
-            J[r, i] /= least
-        for j in range(i + 1, k):
-            dot = 0.0
-            for r in range(6):
-                dot += J[r, i] * J[r, j]
-            for r in range(6):
-                J[r, j] -= dot * J[r, i]
-    return least
-
-
-@jit
 def nearly_singular(model: Array, task: int, size: float, free: Whole, q: Array) -> int:
     """A number whose bit k says whether row k of q ``(m, n)`` is nearly singular, m ≤ 62; NaN rows are not.
 
@@ -137,49 +110,9 @@ def nearly_singular(model: Array, task: int, size: float, free: Whole, q: Array)
             continue
         jacobian_into(model, q[k], whole, at, axes)
         _columns(whole, at, task, size, free, J)
-        if _least_pivot(J) < _SUSPECT:
+        if least_pivot(J) < _SUSPECT:
             found |= 1 << k
     return found
-
-
-@jit
-def _spectrum(J: Array, V: Array, w: Array) -> None:
-    """w ``(k,)`` ← squares of the singular values of J ``(6, k)``, V ``(k, k)`` ← columns: their right vectors.
-
-    One-sided Jacobi rotations, which are exact for small singular values too; J is overwritten.
-    """
-    k = J.shape[1]
-    for i in range(k):
-        for j in range(k):
-            V[i, j] = 1.0 if i == j else 0.0
-    for _ in range(30):
-        turned = False
-        for i in range(k - 1):
-            for j in range(i + 1, k):
-                a = b = c = 0.0
-                for r in range(6):
-                    a += J[r, i] * J[r, i]
-                    b += J[r, j] * J[r, j]
-                    c += J[r, i] * J[r, j]
-                if abs(c) <= 1e-16 * math.sqrt(a * b) or abs(c) < 1e-40:
-                    continue
-                turned = True
-                zeta = (b - a) / (2.0 * c)
-                t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
-                cosine = 1.0 / math.sqrt(1.0 + t * t)
-                sine = cosine * t
-                for r in range(6):
-                    x, y = J[r, i], J[r, j]
-                    J[r, i], J[r, j] = cosine * x - sine * y, sine * x + cosine * y
-                for r in range(k):
-                    x, y = V[r, i], V[r, j]
-                    V[r, i], V[r, j] = cosine * x - sine * y, sine * x + cosine * y
-        if not turned:
-            break
-    for i in range(k):
-        w[i] = 0.0
-        for r in range(6):
-            w[i] += J[r, i] * J[r, i]
 
 
 @jit
@@ -188,7 +121,7 @@ def null_vectors(model: Array, T: Array, task: int, size: float, free: Whole, q:
     k = free.shape[0]
     J, e, V, w = np.empty((6, k)), np.empty(6), np.empty((k, k)), np.empty(k)
     _linear(model, T, task, size, free, q, J, e)
-    _spectrum(J, V, w)
+    singular_values(J, V, w)
     count = 0
     for i in range(k):
         if w[i] < _SINGULAR:
@@ -211,7 +144,7 @@ def _settle(
     miss = math.inf
     for _ in range(_CORRECTIONS):
         miss = _linear(model, T, task, size, free, q, J, e)
-        _spectrum(J, V, w)
+        singular_values(J, V, w)
         if miss < 0.01 * _MET:
             break
         for i in range(k):
@@ -351,7 +284,7 @@ def _fan(null: Array) -> Array:
 def _beside(robot: Robot, points: Array, q: Array) -> bool:
     """Whether a configuration is on the polyline through points ``(m, n)``, whole turns aside."""
     gap = points - q
-    gap = np.where(robot.whole_turns, (gap + math.pi) % (2.0 * math.pi) - math.pi, gap)
+    gap = np.where(robot.whole_turns, wrapped(gap), gap)
     along = gap[1:] - gap[:-1]
     lengths = (along * along).sum(axis=1)
     share = np.clip(-(gap[:-1] * along).sum(axis=1) / np.maximum(lengths, 1e-30), 0.0, 1.0)

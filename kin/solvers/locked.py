@@ -19,10 +19,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.fk import jacobian
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.common import UNBOUNDED, wrap
+from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -30,6 +31,7 @@ from kin.solvers.contract import (
     ClosedForm,
     RedundancyParameter,
     SolverInput,
+    WrappedForm,
     weakest,
 )
 from kin.solvers.reduced import fixed
@@ -92,7 +94,7 @@ def _single_values(arcs: Array) -> list[tuple[int, float]]:
     return found
 
 
-class SingleValues(ClosedForm):
+class SingleValues(WrappedForm):
     """A closed form with exact ranges, in which one joint may have one value only."""
 
     def __init__(self, form: ClosedForm, joint: int, value: float) -> None:
@@ -101,10 +103,6 @@ class SingleValues(ClosedForm):
         self.off = form.off
         self.branches, self.meanings, self.named = _several(form.branches), form.meanings, form.named
         self.kernels = kernels_by_solving(self, form.kernels)
-
-    def handles(self, task: int) -> bool:
-        """The tasks of the closed form."""
-        return self.form.handles(task)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """Those of the closed form but for the first."""
@@ -140,10 +138,6 @@ class SingleValues(ClosedForm):
     def branch_of(self, q: Array) -> int:
         """The first row of the branch that a configuration ``(n,)`` is on."""
         return _PER_BRANCH * self.form.branch_of(q)
-
-    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """Those of the whole arm."""
-        return self.form.singularities(q, within)
 
 
 class LockedJoints(ClosedForm):

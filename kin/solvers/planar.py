@@ -13,21 +13,10 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, excess, wrap
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
-from kin.solvers.common import (
-    HIGH,
-    LOW,
-    NEAR,
-    TURN,
-    add_roots,
-    excess,
-    extend_arcs,
-    lay_probes,
-    nearest_in_arcs,
-    split_sum,
-    wrap,
-)
+from kin.solvers.common import HIGH, LOW, NEAR, add_roots, extend_arcs, lay_probes, nearest_in_arcs, split_sum
 from kin.solvers.contract import APPROACH
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

@@ -23,10 +23,11 @@ from itertools import islice, product
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.axes import Links, is_along, is_zero, links_of, screw_z
 from kin.robot import Joint, Robot
-from kin.solvers.common import TURN, UNBOUNDED
-from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
+from kin.solvers.common import UNBOUNDED
+from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, SolverInput, WrappedForm
 from kin.solvers.singular import JointValue, Singularity
 from kin.transforms import Array
 
@@ -115,7 +116,7 @@ def _nested(T: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in T.tolist())
 
 
-class ReversedJoints(ClosedForm):
+class ReversedJoints(WrappedForm):
     """The closed form of an arm of which some joints are reversed.
 
     It behaves as the family's closed form, in the arm's own joint values: every number that belongs to a reversed
@@ -148,14 +149,6 @@ class ReversedJoints(ClosedForm):
         other.form = self.form.relaxed(by)
         other.kernels = self._kernels(other.form.kernels)
         return other
-
-    def handles(self, task: int) -> bool:
-        """The tasks of the family."""
-        return self.form.handles(task)
-
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """Those of the family; a parameter that is a joint value is that of the arm's own joint."""
-        return self.form.redundancies(task)
 
     def _signs_of(self, task: int) -> list[float]:
         return [-1.0 if r.joint in self.joints else 1.0 for r in self.form.redundancies(task)]

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin.angles import wrapped
 from kin.axes import is_zero, lines_of
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
@@ -68,8 +69,3 @@ def _rolls(arcs: Array, value: float, sense: float) -> Array:
     """Intervals ``(k, 3)`` of the difference θ − φ as intervals of φ."""
     ends = np.sort(sense * (value - arcs[:, 1:]), axis=1)
     return np.column_stack([arcs[:, :1], ends])
-
-
-def wrapped(angles: Array) -> Array:
-    """The same angles in (−π, π]."""
-    return math.pi - (math.pi - angles) % (2.0 * math.pi)

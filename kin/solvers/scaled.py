@@ -26,6 +26,7 @@ from kin.solvers.contract import (
     Obstacle,
     RedundancyParameter,
     SolverInput,
+    WrappedForm,
 )
 from kin.solvers.reversed import WrappedKernels
 from kin.solvers.singular import JointValue, Singularity
@@ -71,7 +72,7 @@ def _moved(T: Array, scale: float) -> Array:
     return out
 
 
-class Scaled(ClosedForm):
+class Scaled(WrappedForm):
     """The closed form of an arm in another unit of length.
 
     Attributes:
@@ -113,14 +114,6 @@ class Scaled(ClosedForm):
     def _sizes(self, parameters: Sequence[RedundancyParameter]) -> list[float]:
         """Metres, or radians, of each redundancy parameter in the unit."""
         return [float(self._metres[p.joint]) if p.joint >= 0 else 1.0 for p in parameters]
-
-    def handles(self, task: int) -> bool:
-        """The tasks of the form."""
-        return self.form.handles(task)
-
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """Those of the form."""
-        return self.form.redundancies(task)
 
     def solve(self, problem: SolverInput) -> Candidates:
         """The branches, with joint values, ranges and gaps in metres."""

@@ -20,13 +20,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.axes import frame_of, is_along, is_zero, lines_of, perpendicular_to
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single, solve_each
 from kin.solvers.canonical import pose_params, signed_box
-from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, split_sum, wrap
+from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, split_sum
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -278,7 +279,7 @@ class Scara4(ClosedForm):
         g = self.geometry = geometry
         self.reason = "all axes are parallel" + ", and one joint slides" * (len(g.order) == 4)
         self.lengths = (g.a, g.b)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=_solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -310,10 +311,6 @@ class Scara4(ClosedForm):
         obstacle = None if exists else Obstacle("last axis beyond the links' reach")
         ranges = (arcs[:count],) if free else ()
         return Candidates(out[:, :n], out[:, n:], ranges, 0.0 if exists else max(gap, 0.0), obstacle)
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """Both branches of many poses."""
-        _solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def _elbow(self, q: Array) -> float:
         """θ2: 0 where the arm is straight."""

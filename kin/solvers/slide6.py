@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from kin.axes import is_perpendicular, is_zero, links_of, screw_x, screw_z
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
 from kin.robot import Robot
 from kin.solvers.blocks import Arc, Entries, each, one
-from kin.solvers.contract import BatchKernels, Obstacle
+from kin.solvers.contract import Obstacle
 from kin.solvers.names import Names, Part, eight, front_or_back, names_of
 from kin.solvers.singular import JointValue, Singularity, off_line, those_within
 from kin.solvers.wrist6.batch import (
@@ -144,7 +145,7 @@ class Slide6(Wrist6):
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         super().__init__(geometry, robot)
-        self.kernels = BatchKernels(geometry.params, branches_one, branches_many)
+        self.kernels = replace(self.kernels, one=branches_one, many=branches_many)
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The rows are the signs of X, of S and of s5; the boom is out where the middle of its range is."""

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from kin.fk import fk
 from kin.kernels.compile import jit
 from kin.robot import Robot
-from kin.solvers.common import TURN
 from kin.solvers.contract import ClosedForm, RedundancyParameter
 from kin.transforms import Array
 
@@ -55,13 +51,3 @@ class SlidesForm(ClosedForm):
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """None."""
         return ()
-
-    def branch_of(self, q: Array) -> int:
-        """The row of q ``(n,)`` among the configurations of its target."""
-        out, near = np.empty((2, self.robot.n)), np.array(q, dtype=np.float64)
-        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
-        off = out - q
-        turns = self.robot.revolute
-        off[:, turns] = (off[:, turns] + math.pi) % TURN - math.pi
-        apart = np.abs(off).max(axis=1)
-        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))

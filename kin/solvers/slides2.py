@@ -20,12 +20,13 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.fk import jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
 from kin.solvers.blocks import solve_each
-from kin.solvers.common import clear, wrap
+from kin.solvers.common import clear
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -172,7 +173,7 @@ class Slides2(SlidesForm):
         self.robot = robot
         order = np.concatenate([np.flatnonzero(robot.revolute), np.flatnonzero(~robot.revolute)])
         params = np.concatenate([order, [_reach(robot)], robot.model]).astype(np.float64)
-        self.kernels = BatchKernels(params, branches_one, branches_many)
+        self.kernels = BatchKernels(params, branches_one, branches_many, seeded=_solve_many)
 
     def handles(self, task: int) -> bool:
         """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""
@@ -186,10 +187,6 @@ class Slides2(SlidesForm):
         obstacle = None if there.any() else Obstacle("point")
         regular = _surely_regular(self.kernels.params, q) or not (self._smallest(q[there]) < REGULAR).any()
         return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "proved" if regular else "searched")
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """Both configurations of many targets."""
-        _solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def _smallest(self, q: Array) -> Array:
         """The smallest singular value of the Jacobian of the point ``(k,)``, lengths in shares of the reach."""

@@ -22,12 +22,13 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.fk import fk, jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
 from kin.solvers.blocks import solve_each
-from kin.solvers.common import clear, wrap
+from kin.solvers.common import clear
 from kin.solvers.contract import (
     POSE,
     BatchKernels,
@@ -35,7 +36,6 @@ from kin.solvers.contract import (
     Completeness,
     SolverInput,
 )
-from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.solvers.slides import ALIKE, REGULAR, SlidesForm, dot, is_finite, triple
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -195,7 +195,7 @@ class Slides3(SlidesForm):
         zero = np.zeros(6)
         axes, R = jacobian(robot, zero)[3:, turns].T, fk(robot, zero)[:3, :3]
         params = np.concatenate([turns, slides, axes.ravel(), R.ravel(), robot.model]).astype(np.float64)
-        self.kernels = BatchKernels(params, branches_one, branches_many)
+        self.kernels = BatchKernels(params, branches_one, branches_many, seeded=_solve_many)
 
     def handles(self, task: int) -> bool:
         """Poses."""
@@ -207,15 +207,7 @@ class Slides3(SlidesForm):
         known = self.add_missing(problem.T, problem.seed, q)
         return Candidates(q, np.empty((2, 0)), (), completeness=known)
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """Both configurations of many poses."""
-        _solve_many(self.kernels.params, T, seeds, lower, upper, q)
-
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
         """q ``(2, 6)`` ← all configurations; more may exist where the slides lie in one plane."""
         whole = configurations(self.kernels.params, np.ascontiguousarray(T), near, q)
         return "proved" if whole else "unknown"
-
-    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """The smallest singular value of the Jacobian."""
-        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))

@@ -23,9 +23,8 @@ from numpy.typing import ArrayLike
 
 from kin.collision import Obstacle
 from kin.collision.contacts import surroundings
-from kin.errors import InputError
+from kin.errors import InputError, finite_number
 from kin.ik import solve_ik
-from kin.ik.options import finite_number
 from kin.ik.problem import never_cancel
 from kin.named import robot_of
 from kin.robot import Robot

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.ik.options import JointConstraints, Limits, Locks
 from kin.ik.problem import never_cancel
 from kin.named import robot_of
 from kin.robot import Robot
-from kin.solvers.common import TURN
 from kin.workspace.region import Region, checked_integer
 from kin.workspace.results import WorkspaceFacts
 from kin.workspace.search.extremes import along, base_axis, from_axis, from_point

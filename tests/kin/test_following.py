@@ -97,7 +97,8 @@ def test_an_arm_without_followers_is_its_own_free_arm_and_has_the_same_numbers()
     assert (robot.coupled, robot.free is robot, robot.leads.any()) == (False, True, False)
     assert robot.expand(robot.q_home) is robot.q_home
     assert np.array_equal(robot.expansion, np.eye(6))
-    assert set(robot.model[27 + 7 :: 8].tolist()) == {0.0}, "kernels read a ratio of rows that follow only"
+    turn, slide = robot.model[27:].reshape(6, -1)[:, 7:].T.tolist()
+    assert (turn, slide) == ([1.0] * 6, [0.0] * 6), "each row turns by the joint value as it is"
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from app.exercises.questions import Asked, Verdict
 from app.exercises.typed import read_number
 from app.exercises.variant import Variant
 from kin import IKOptions, InputError
+from kin.angles import wrapped
 from kin.ik import Task
 from kin.ik.details import Solved
 from kin.ik.options import TASKS
@@ -115,8 +116,7 @@ class SolutionsKind(Kind):
         """The solution that a row means."""
         turns = variant.robot.revolute
         for i, solution in enumerate(solutions):
-            gap = q - solution
-            gap = np.where(turns, np.abs(np.remainder(gap + math.pi, 2.0 * math.pi) - math.pi), np.abs(gap))
+            gap = np.abs(np.where(turns, wrapped(q - solution), q - solution))
             if (gap <= np.where(turns, self.tolerance, 2e-3)).all() and variant.robot.in_limits(q, self.tolerance):
                 return i
         return None

@@ -17,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.axes import frame_of, inverse, perpendicular_to
-from kin.checks import one_of
 from kin.dh.tables import SAMPLES, table_of_chain
-from kin.errors import InputError, RobotFileError
+from kin.errors import InputError, RobotFileError, one_of
 from kin.files.home import default_home
 from kin.files.names import unused
 from kin.files.numbers import LARGEST, number_of

@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.kernels.dense import cholesky, solve_positive
 from kin.kernels.jacobian import jacobian_into
-from kin.motion.geometry.tracking import approach, solve_into, to_tool
+from kin.motion.geometry.tracking import approach, gram, to_tool
 from kin.transforms import Array
 
 _SINGULAR = 0.05  # weight of the logarithm of manipulability
@@ -73,17 +74,6 @@ def _jacobian(model: Array, rows: int, q: Array, J: Array) -> None:
 
 
 @jit
-def _gram(J: Array, rows: int, damping: float, A: Array) -> None:
-    """A ← J Jᵀ of the rows that count."""
-    for r in range(rows):
-        for c in range(rows):
-            total = damping if r == c else 0.0
-            for j in range(J.shape[1]):
-                total += J[r, j] * J[c, j]
-            A[r, c] = total
-
-
-@jit
 def _directions(model: Array, rows: int, q: Array, z: Array) -> None:
     """z ← the directions ``(k, n)`` in which the tool rests, of size 1 and continuous along the path."""
     k, n = q.shape
@@ -97,8 +87,9 @@ def _directions(model: Array, rows: int, q: Array, z: Array) -> None:
                 y[r] = 0.0
                 for j in range(n):
                     y[r] += J[r, j] * ((1.0 if j == first else 0.0) if i == 0 else z[i - 1, j])
-            _gram(J, rows, 1e-12, A)
-            solve_into(A, y)
+            gram(J, rows, 1e-12, A)
+            if not solve_positive(A, rows, 0.0, 0.0, y):
+                continue
             length = 0.0
             for j in range(n):
                 found[j] = (1.0 if j == first else 0.0) if i == 0 else z[i - 1, j]
@@ -125,13 +116,10 @@ def _cost(model: Array, rows: int, bounds: Array, q: Array) -> float:
             total += off**8
     J, A = np.empty((6, n)), np.empty((rows, rows))
     _jacobian(model, rows, q, J)
-    _gram(J, rows, 1e-12, A)
-    for i in range(rows):  # Cholesky
-        for j in range(i + 1):
-            rest = A[i, j]
-            for c in range(j):
-                rest -= A[i, c] * A[j, c]
-            A[i, j] = math.sqrt(max(rest, 1e-30)) if i == j else rest / A[j, j]
+    gram(J, rows, 1e-12, A)
+    if not cholesky(A, rows, 0.0, 0.0):
+        return math.inf
+    for i in range(rows):
         total -= _SINGULAR * math.log(A[i, i])
     return total
 

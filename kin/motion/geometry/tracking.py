@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.kernels.dense import solve_positive
 from kin.kernels.jacobian import jacobian_into
 from kin.transforms import Array
 
@@ -64,7 +65,8 @@ def approach(model: Array, target: Array, rows: int, q: Array) -> float:
             break
         last = size
         to_tool(J, T, rows)
-        _step(J, e, rows, min(size * size, 1e-2) + 1e-20, q)
+        if not _step(J, e, rows, min(size * size, 1e-2) + 1e-20, q):
+            break
     for j in range(n):
         q[j] = best[j]
     return least
@@ -83,23 +85,20 @@ def to_tool(J: Array, T: Array, rows: int) -> None:
 
 
 @jit
-def _step(J: Array, e: Array, rows: int, damping: float, q: Array) -> None:
-    """q ← q + the damped least-squares step for e."""
+def _step(J: Array, e: Array, rows: int, damping: float, q: Array) -> bool:
+    """q ← q + the damped least-squares step for e; False if rounding errors leave none."""
     n = q.shape[0]
     if n >= rows:
         A, y = np.empty((rows, rows)), np.empty(rows)
+        gram(J, rows, damping, A)
         for r in range(rows):
             y[r] = e[r]
-            for c in range(rows):
-                total = damping if r == c else 0.0
-                for j in range(n):
-                    total += J[r, j] * J[c, j]
-                A[r, c] = total
-        solve_into(A, y)
+        if not solve_positive(A, rows, 0.0, 0.0, y):
+            return False
         for j in range(n):
             for r in range(rows):
                 q[j] += J[r, j] * y[r]
-        return
+        return True
     B, z = np.empty((n, n)), np.empty(n)
     for i in range(n):
         z[i] = 0.0
@@ -110,32 +109,22 @@ def _step(J: Array, e: Array, rows: int, damping: float, q: Array) -> None:
             for r in range(rows):
                 total += J[r, i] * J[r, j]
             B[i, j] = total
-    solve_into(B, z)
+    if not solve_positive(B, n, 0.0, 0.0, z):
+        return False
     for i in range(n):
         q[i] += z[i]
+    return True
 
 
 @jit
-def solve_into(A: Array, y: Array) -> None:
-    """y ← A⁻¹ y for a positive definite A, which is overwritten (Cholesky)."""
-    m = y.shape[0]
-    for i in range(m):
-        for j in range(i + 1):
-            total = A[i, j]
-            for k in range(j):
-                total -= A[i, k] * A[j, k]
-            if i == j:
-                A[i, i] = math.sqrt(max(total, 1e-30))
-            else:
-                A[i, j] = total / A[j, j]
-    for i in range(m):
-        for k in range(i):
-            y[i] -= A[i, k] * y[k]
-        y[i] /= A[i, i]
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            y[i] -= A[k, i] * y[k]
-        y[i] /= A[i, i]
+def gram(J: Array, rows: int, damping: float, A: Array) -> None:
+    """A ← J Jᵀ + damping · I of the rows that count."""
+    for r in range(rows):
+        for c in range(rows):
+            total = damping if r == c else 0.0
+            for j in range(J.shape[1]):
+                total += J[r, j] * J[c, j]
+            A[r, c] = total
 
 
 @jit

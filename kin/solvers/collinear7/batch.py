@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, each, one, rows_of
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.collinear7.branches import SLACK, solve
-from kin.solvers.common import wrap
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

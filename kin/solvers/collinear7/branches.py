@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_box, canonical_pose
@@ -20,7 +21,6 @@ from kin.solvers.common import (
     merged,
     misfit_of,
     split_sum,
-    wrap,
     zyz,
     zyz_breaks,
 )

@@ -59,7 +59,7 @@ class Collinear7(ClosedForm):
     def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
-        self.kernels = BatchKernels(np.append(g.params, REACH), branches_one, branches_many)
+        self.kernels = BatchKernels(np.append(g.params, REACH), branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -94,10 +94,6 @@ class Collinear7(ClosedForm):
         if free_roll:
             return Candidates(out[:, :7], out[:, 7:], (arcs[:count], rolls[:roll_count]), gap, obstacle)
         return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The branches of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def relaxed(self, by: float) -> Collinear7:
         """The same with a forearm that may miss the wrist centre by some more metres."""

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.kernels.compile import jit
 from kin.solvers.canonical import OFFSET, canonical_pose
-from kin.solvers.common import HIGH, LOW, NEAR, TURN, extend_arcs, misfit_of, nearest_in_arcs, zyz
+from kin.solvers.common import HIGH, LOW, NEAR, extend_arcs, misfit_of, nearest_in_arcs, zyz
 from kin.transforms import Array
 
 

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin.angles import apart
 from kin.axes import screw_x, screw_z
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
-from kin.solvers.common import TURN, UNBOUNDED
+from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -152,14 +153,9 @@ class General5(ClosedForm):
             first = np.where(there[:, ::2], numbers[:, ::2], numbers[:, 1::2])
             return np.where(there[:, ::2] | there[:, 1::2], first, -1)
         if not self._rolls:
-            off = np.abs((q[:, :, self.robot.n :] + math.pi) % TURN - math.pi).max(axis=2)
+            off = apart(q[:, :, self.robot.n :], np.zeros(6 - self.robot.n))
             there = there & (off < _AT_ZERO)
         return np.where(there, numbers, -1)
-
-    def _gaps(self, off: Array) -> Array:
-        """Differences of joint values ``(…, n)`` without their signs, whole turns aside."""
-        turns = self.robot.revolute
-        return np.abs(np.where(turns, (off + math.pi) % TURN - math.pi, off))
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
         """The batch kernels of the arm from those of the six joints."""
@@ -204,10 +200,7 @@ class General5(ClosedForm):
         if self.named:
             row = self.form.branch_of(np.append(q, np.zeros(6 - self.robot.n)))
             return row // 2 if self._point else row
-        out = np.empty((len(self.branches), self.robot.n))
-        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, np.asarray(q), out)
-        apart = self._gaps(out - q).max(axis=1)
-        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
+        return super().branch_of(q)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The smallest singular value of the Jacobian of what the arm can control."""

@@ -19,19 +19,19 @@ import math
 
 import numpy as np
 
+from kin.angles import apart, wrapped
 from kin.axes import cross, lines_of, perpendicular_to
 from kin.differential.metric import extent
 from kin.fk import fk, jacobian
 from kin.robot import Robot
-from kin.solvers.common import TURN
 from kin.solvers.contract import (
     APPROACH,
     POSE,
     POSITION,
-    BatchKernels,
     Candidates,
     ClosedForm,
     Obstacle,
+    PlainKernels,
     RedundancyParameter,
     SolverInput,
 )
@@ -118,14 +118,6 @@ def _roots(kept: _Joint, gone: _Joint, M: Array, N: Array, c: Array) -> list[flo
     return found
 
 
-class _Kernels(BatchKernels):
-    """Batch kernels that are not compiled."""
-
-    def unchecked(self) -> BatchKernels:
-        """The same."""
-        return self
-
-
 class Point3(ClosedForm):
     """All configurations of three joints for a point."""
 
@@ -142,7 +134,7 @@ class Point3(ClosedForm):
         kind = "revolute joints" if robot.revolute.all() else "joints"
         self.reason = f"three {kind} whose axes fit no closed form: a polynomial of degree four"
         self._unit = np.where(robot.revolute, 1.0, self._size)  # of joint values: radians, metres
-        self.kernels = _Kernels(np.empty(0), self._one, self._many)
+        self.kernels = PlainKernels(np.empty(0), self._one, self._many)
 
     def handles(self, task: int) -> bool:
         """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""
@@ -229,23 +221,13 @@ class Point3(ClosedForm):
 
     def _distinct(self, q: Array) -> Array:
         """The rows ``(k, 3)``, angles in (−π, π], each once, filled up with NaN."""
-        q = np.where(self.robot.revolute, math.pi - (math.pi - q) % TURN, q)
+        q = np.where(self.robot.revolute, wrapped(q), q)
         out, count = np.full((ROWS, 3), math.nan), 0
         for row in q:
-            off = self._gaps(out[:count] - row).max(axis=1)
-            if count < ROWS and not (off < TOLERANCES.merge).any():
+            if count < ROWS and not (apart(out[:count], row, self.robot.revolute) < TOLERANCES.merge).any():
                 out[count] = row
                 count += 1
         return out
-
-    def _gaps(self, off: Array) -> Array:
-        """Differences of joint values ``(…, 3)`` without their signs, whole turns aside."""
-        return np.abs(np.where(self.robot.revolute, (off + math.pi) % TURN - math.pi, off))
-
-    def branch_of(self, q: Array) -> int:
-        """The row of q ``(3,)`` among all configurations of its point."""
-        apart = self._gaps(self._configurations(fk(self.robot, q), np.asarray(q)) - q).max(axis=1)
-        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The smallest singular value of the Jacobian of the point."""

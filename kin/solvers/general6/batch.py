@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
-from kin.solvers.common import TURN, clear, wrap
+from kin.solvers.common import clear
 from kin.solvers.general6.cuts import (
     AFTER,
     BEFORE,

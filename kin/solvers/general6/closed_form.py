@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kin.angles import apart, wrapped
 from kin.axes import is_along, is_zero, links_of, screw_x, screw_z
 from kin.differential.metric import extent
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
-from kin.solvers.common import TURN, UNBOUNDED
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -34,10 +34,9 @@ from kin.solvers.general6.batch import (
     solve_all,
 )
 from kin.solvers.general6.cuts import cuts_of
-from kin.solvers.general6.opposite import OppositeKernels, loop_with_opposite_slides, solve_opposite
+from kin.solvers.general6.opposite import loop_with_opposite_slides, opposite_kernels, solve_opposite
 from kin.solvers.general6.orders import Reading, readings
-from kin.solvers.numeric import each_of
-from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.solvers.numeric import descend_freely
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -59,7 +58,6 @@ _STEPS = tuple(
     screw_z(1e-3 * a, 1e-3 * b) @ screw_x(1e-3 * c, 1e-3 * d)
     for a, b, c, d in ((1.0, 0.6, -0.8, 0.9), (-0.7, 0.8, 1.1, -0.5), (0.3, -1.2, 0.9, 0.4))
 )
-_MASK = np.array([1.0] * 6 + [0.0])
 _MET, _SAME = 1e-10, 1e-6
 _JOINTS = np.arange(6)
 _COPIES = 1e-3  # rad, m: farther apart are no copies of one solution, whatever its multiplicity
@@ -88,7 +86,7 @@ def match(robot: Robot) -> General6 | None:
         kernels, solve = BatchKernels(cuts, branches_one, branches_many), solve_all
         opposite = None if len(cuts) else loop_with_opposite_slides(reading.robot)
         if opposite is not None:
-            kernels, solve = OppositeKernels(opposite), solve_opposite
+            kernels, solve = opposite_kernels(opposite), solve_opposite
         missed = _missed(reading.robot, kernels)
         if len(kernels.params) and (best is None or missed < best[0]):
             best = missed, General6(robot, kernels, on_axis, reading, solve)
@@ -137,21 +135,14 @@ def _best_cuts(robot: Robot) -> Array:
             continue
         branches_many(cut, T, np.array([math.nan]), q[0], out)
         there = ~np.isnan(out[:, :, 0])
-        apart = _apart(robot, out, q[:, None])
-        apart[~there] = math.inf
-        missed = int((apart.min(axis=1) > 1e-6).sum())
+        away = apart(out, q[:, None], robot.revolute)
+        away[~there] = math.inf
+        missed = int((away.min(axis=1) > 1e-6).sum())
         if missed < _POSES // 4:
             off = int(math.log(misfit / _EXACT) / math.log(_SIMILAR))
             ranked.append((off, missed, -int(there.sum()), len(ranked), cut))
     ranked.sort(key=lambda entry: entry[:4])
     return np.concatenate([entry[4] for entry in ranked[:_CUTS]] or [np.empty(0)])
-
-
-def _apart(robot: Robot, rows: Array, q: Array) -> Array:
-    """The largest joint difference ``(…)`` of each row ``(…, 6)`` from q ``(6,)``, whole turns aside."""
-    off = rows - q
-    off = np.where(robot.revolute, (off + math.pi) % TURN - math.pi, off)
-    return np.asarray(np.abs(off).max(axis=-1, initial=0.0))
 
 
 class General6(ClosedForm):
@@ -207,11 +198,10 @@ class General6(ClosedForm):
 
         What is between two copies meets the target as well as they do; between two solutions nothing does.
         """
-        rows = np.flatnonzero(~np.isnan(q[:, 0])).tolist()
+        turns, rows = self.robot.revolute, np.flatnonzero(~np.isnan(q[:, 0])).tolist()
         for k, i in enumerate(rows):
-            close = [j for j in rows[:k] if _apart(self.robot, q[j], q[i]) < _COPIES]
-            off = q[close] - q[i]
-            off = np.where(self.robot.revolute, (off + math.pi) % TURN - math.pi, off)
+            close = [j for j in rows[:k] if apart(q[j], q[i], turns) < _COPIES]
+            off = np.where(turns, wrapped(q[close] - q[i]), q[close] - q[i])
             miss = np.abs(fk(self.robot, q[i] + 0.5 * off) - T).max(axis=(1, 2), initial=0.0)
             if (miss < TOLERANCES.closure_position).any():
                 q[i] = q[close[int(miss.argmin())]]
@@ -256,7 +246,7 @@ class General6(ClosedForm):
         """The configurations ``(k, 6)``, each once, and of those on one curve the first."""
         kept: list[int] = []
         for i, row in enumerate(rows):
-            if all(_apart(self.robot, rows[kept], row) > _SAME) and len(kept) < _MOST_ROWS:
+            if all(apart(rows[kept], row, self.robot.revolute) > _SAME) and len(kept) < _MOST_ROWS:
                 kept.append(i)
         rows = np.ascontiguousarray(rows[kept])
         return rows[curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))[1]]
@@ -296,7 +286,7 @@ class General6(ClosedForm):
     def _add(self, T: Array, starts: Array, q: Array, count: int) -> int:
         """Add to the first `count` rows of q ``(16, 6)`` where descents from `starts` end; their number."""
         for row in self._descended(T, starts):
-            if count < SOLUTIONS and all(_apart(self.robot, q[:count], row) > _SAME):
+            if count < SOLUTIONS and all(apart(q[:count], row, self.robot.revolute) > _SAME):
                 q[count] = row
                 count += 1
         return count
@@ -310,19 +300,6 @@ class General6(ClosedForm):
 
     def _descended(self, T: Array, starts: Array) -> Array:
         """Where descents from `starts` ``(k, 6)`` meet the target."""
-        rows, errors, wide = starts.copy(), np.empty(len(starts)), np.full(6, UNBOUNDED)
-        goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
-        each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(rows) + 1, rows, errors)
+        rows, errors = descend_freely(self.robot.model, T, POSE, starts)
         met = rows[errors < _MET]
-        return np.asarray(np.where(self.robot.revolute, math.pi - (math.pi - met) % TURN, met))
-
-    def branch_of(self, q: Array) -> int:
-        """The row of q ``(6,)`` among all solutions of its pose."""
-        out = np.empty((SOLUTIONS, 6))
-        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, q, out)
-        apart = _apart(self.robot, out, q)
-        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
-
-    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """The smallest singular value of the Jacobian: where it vanishes has no simple form."""
-        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))
+        return np.asarray(np.where(self.robot.revolute, wrapped(met), met))

@@ -16,10 +16,10 @@ import math
 
 import numpy as np
 
+from kin.angles import apart, wrapped
 from kin.axes import links_of
 from kin.robot import Robot
-from kin.solvers.common import TURN
-from kin.solvers.contract import BatchKernels
+from kin.solvers.contract import PlainKernels
 from kin.solvers.general6.batch import AGREED, NOT_FINITE, OPEN, loop_of
 from kin.solvers.general6.cuts import (
     OFFSET,
@@ -179,14 +179,12 @@ def _row(params: Array, t: Array) -> Array:
     t = t + np.array([0.0, 0.0, 0.0, TURN_D, TURN_E, 0.0])
     q = params[SIGN:OFFSET] * (np.roll(t, int(params[SHIFT])) - params[OFFSET : OFFSET + 6])
     slides = np.roll(params[SLIDES:SIZE], int(params[SHIFT])) != 0.0
-    return np.where(slides, q * params[SIZE_OF_ARM], math.pi - (math.pi - q) % TURN)
+    return np.where(slides, q * params[SIZE_OF_ARM], wrapped(q))
 
 
 def _known(rows: Array, row: Array, slides: Array, shift: int) -> bool:
     """Whether a configuration is among the rows."""
-    off = rows - row
-    off = np.where(np.roll(slides, shift) != 0.0, off, (off + math.pi) % TURN - math.pi)
-    return bool((np.abs(off).max(axis=1, initial=0.0) < TOLERANCES.merge).any())
+    return bool((apart(rows, row, np.roll(slides, shift) == 0.0) < TOLERANCES.merge).any())
 
 
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
@@ -200,12 +198,6 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
         solve_opposite(params, T[k], out[k])
 
 
-class OppositeKernels(BatchKernels):
-    """Both functions above; they are not compiled, so there is nothing to unwrap."""
-
-    def __init__(self, params: Array) -> None:
-        super().__init__(params, branches_one, branches_many)
-
-    def unchecked(self) -> BatchKernels:
-        """The same."""
-        return self
+def opposite_kernels(params: Array) -> PlainKernels:
+    """Both functions above, for an arm as they read it."""
+    return PlainKernels(params, branches_one, branches_many)

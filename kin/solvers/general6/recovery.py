@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
-from kin.solvers.common import wrap
+from kin.kernels.dense import solve_positive
 from kin.solvers.general6.elimination import QUANTITIES, SCALARS, UNKNOWN, moved, quantities
 from kin.transforms import Array
 
@@ -226,7 +227,7 @@ def _miss(T: Array, e: Array) -> float:
 def polish(F: Array, slides: Array, t: Array) -> bool:
     """Move t ``(6,)`` onto a solution of the loop, in place; False if none is near (Levenberg and Marquardt)."""
     T, axes, e, step = np.empty((3, 4)), np.empty((6, 6)), np.empty(6), np.empty(6)
-    H, g, trial = np.empty((6, 6)), np.empty(6), np.empty(6)
+    H, L, g, trial = np.empty((6, 6)), np.empty((6, 6)), np.empty(6), np.empty(6)
     close(F, slides, t, T, axes)
     cost = _miss(T, e)
     damping = 1e-3
@@ -245,7 +246,11 @@ def polish(F: Array, slides: Array, t: Array) -> bool:
         better = math.inf
         while left > 0:
             left -= 1
-            if _damped_step(H, g, damping * cost + 1e-16, step):
+            for i in range(6):
+                step[i] = g[i]
+                for j in range(i + 1):
+                    L[i, j] = H[i, j]
+            if solve_positive(L, 6, damping * cost + 1e-16, 0.0, step):
                 for i in range(6):
                     trial[i] = t[i] + step[i]
                 close(F, slides, trial, T, axes)
@@ -266,30 +271,3 @@ def polish(F: Array, slides: Array, t: Array) -> bool:
     for i in range(6):
         t[i] = wrap(t[i]) if slides[i] == 0.0 else t[i]
     return cost < _THERE * _THERE
-
-
-@jit
-def _damped_step(H: Array, g: Array, damping: float, x: Array) -> bool:
-    """x ``(6,)`` ← (H + damping I)⁻¹ g for a lower triangle H ``(6, 6)``; False if not positive definite."""
-    L = np.empty((6, 6))
-    for i in range(6):
-        right = g[i]
-        for j in range(i):
-            total = H[i, j]
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            L[i, j] = total / L[j, j]
-            right -= L[i, j] * x[j]
-        total = H[i, i] + damping
-        for k in range(i):
-            total -= L[i, k] * L[i, k]
-        if total <= 1e-300:
-            return False
-        L[i, i] = math.sqrt(total)
-        x[i] = right / L[i, i]
-    for i in range(5, -1, -1):
-        total = x[i]
-        for k in range(i + 1, 6):
-            total -= L[k, i] * x[k]
-        x[i] = total / L[i, i]
-    return True

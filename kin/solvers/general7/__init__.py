@@ -5,7 +5,8 @@ with six joints that does not depend on the value: a family with a closed form i
 :mod:`kin.solvers.general6`, whose cuts are validated once.
 
 Rows are numbered, not named: from one value to the next, solutions appear, vanish and change places. The range of
-a solution is found by following its self-motion (:mod:`kin.solvers.general7.motion`).
+a solution is found by following its self-motion (:mod:`kin.solvers.selfmotion`), and so is the solution nearest
+to a seed (:mod:`kin.solvers.general7.motion`).
 """
 
 from kin.solvers.general7.closed_form import NAME as NAME

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin.angles import TURN, apart, wrapped
 from kin.axes import frame_of, inverse, lines_of, perpendicular_to
-from kin.fk import jacobian
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import turn_around
-from kin.solvers.common import TURN, UNBOUNDED, nearest_image
+from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -25,10 +25,10 @@ from kin.solvers.contract import (
     SolverInput,
     weakest,
 )
-from kin.solvers.general7.motion import end_of_motion, nearest_on_motion, to_images
+from kin.solvers.general7.motion import nearest_on_motion, to_images
 from kin.solvers.reduced import fixed
 from kin.solvers.reversed import WrappedKernels
-from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.solvers.selfmotion.tracing import end_of_motion
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -172,11 +172,11 @@ class General7(ClosedForm):
         found, lower, upper = self._at(p, tried), *(np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (p.lower, p.upper))
         q = found.reshape(-1, 7)
         squares, outside = np.empty(len(q)), self._outside(p, found)
-        apart = np.linalg.norm((found - p.seed + math.pi) % TURN - math.pi, axis=-1)  # at least
+        away = np.linalg.norm(wrapped(found - p.seed), axis=-1)  # at least
         to_images(q, p.seed, lower, upper, i, squares)
         # Where solutions begin to exist, or come close to the limits, there may be nearer ones between two values.
-        near = apart < math.sqrt(squares.min()) + _NEARER
-        close, there = ((outside > 0.0) & (outside < _CLOSE) & near).any(axis=1), np.isfinite(apart).sum(axis=1)
+        near = away < math.sqrt(squares.min()) + _NEARER
+        close, there = ((outside > 0.0) & (outside < _CLOSE) & near).any(axis=1), np.isfinite(away).sum(axis=1)
         folds = (there[1:] != there[:-1]) & (near[1:] | near[:-1]).any(axis=1)
         cells = np.flatnonzero(folds | close[1:] | close[:-1])
         shares = np.arange(1, _PARTS) / _PARTS
@@ -219,7 +219,7 @@ class General7(ClosedForm):
         """How far configurations ``(..., 7)`` are outside the limits, in all; ∞ for those that do not exist."""
         half = 0.5 * (problem.upper - problem.lower)
         middle = np.add(problem.lower, half, where=np.isfinite(half), out=np.zeros_like(half))
-        off = np.abs((q - middle + math.pi) % TURN - math.pi) - half - TOLERANCES.limit
+        off = np.abs(wrapped(q - middle)) - half - TOLERANCES.limit
         total = np.maximum(off, 0.0).sum(axis=-1)
         return np.where(np.isnan(total), math.inf, total)
 
@@ -246,20 +246,10 @@ class General7(ClosedForm):
         there = self._at(problem, np.array([nearest]))[0]
         return (nearest, there) if self._inside(problem, there).any() else (float(tried[best]), found[best])
 
-    def _image(self, problem: SolverInput, row: Array) -> Array:
-        """A solution at its whole turns inside the limits, nearest to the seed; the given joint as it is."""
-        q = np.array([
-            nearest_image(float(x), float(near), float(low), float(high))
-            for x, near, low, high in zip(row, problem.seed, problem.lower, problem.upper, strict=True)
-        ])  # fmt: skip
-        q[self.given] = row[self.given]
-        return q
-
     def _end(self, problem: SolverInput, row: Array, sense: float) -> float:
         """The end of the self-motion from a solution inside the limits."""
         lower, upper = (np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (problem.lower, problem.upper))
-        q = self._image(problem, row)
-        return float(end_of_motion(self.robot.model, problem.T, self.given, sense, q, lower, upper))
+        return float(end_of_motion(self.robot.model, problem.T, self.given, sense, row, lower, upper))
 
     def _ranges(self, problem: SolverInput, out: Array) -> Array:
         """The range of the given joint around each solution ``(rows, 7)`` that is inside the limits."""
@@ -317,10 +307,8 @@ class General7(ClosedForm):
     def _reached(self, problem: SolverInput, there: Array, here: Array, to: float) -> float:
         """How far solutions `here` ``(k, 7)`` go on towards the next value; those there are `there` ``(m, 7)``."""
         start = float(here[0, self.given])
-        if len(there):
-            off = np.abs((there[:, None] - here[None] + math.pi) % TURN - math.pi).max(axis=2)
-            if off.min() < _SAME_MOTION:
-                return to
+        if len(there) and apart(there[:, None], here).min() < _SAME_MOTION:
+            return to
         sense = math.copysign(1.0, to - start)
         lower, upper = problem.lower.copy(), problem.upper.copy()
         lower[self.given], upper[self.given] = min(start, to), max(start, to)
@@ -332,7 +320,3 @@ class General7(ClosedForm):
         """The row of q ``(7,)`` among all solutions of its pose with the same value of the given joint."""
         others = [i for i in range(7) if i != self.given]
         return self.form.branch_of(np.asarray(q)[others])
-
-    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """The smallest singular value of the Jacobian: where it vanishes has no simple form."""
-        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))

@@ -31,6 +31,7 @@ radian), *bounds* are (lower, upper, turns), each ``(n,)``; turns is 2π for a j
 else 0.
 """
 
+from kin.solvers.numeric.starts import descend_freely as descend_freely
 from kin.solvers.numeric.starts import each_of as each_of
 from kin.solvers.numeric.starts import solve as solve
 from kin.solvers.numeric.starts import spread as spread

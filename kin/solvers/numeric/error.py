@@ -82,7 +82,7 @@ def second_order(goal: Goal, J: Array, T: Array, e: Array, H: Array) -> None:
 
     With ω the axis of a joint (0 if it is prismatic), v its column of the point's Jacobian and joint j before
     joint i: ∂v_i/∂q_j = ω_j × v_i. For half the squared angle of φ between two orientations, with b as in
-    `_mask_rows`:  b ((φ·ω_i)(φ·ω_j) − θ² ω_i·ω_j) − ½ φ·(ω_j × ω_i). For the angle α between two directions, of
+    `mask_rows`:  b ((φ·ω_i)(φ·ω_j) − θ² ω_i·ω_j) − ½ φ·(ω_j × ω_i). For the angle α between two directions, of
     which the tool's own is a: (α cot α − 1)(u_i·φ/α)(u_j·φ/α) − (φ × a)·(ω_j × u_i) with u = ω × a, the Hessian
     of the squared distance on a sphere.
     """
@@ -125,7 +125,7 @@ def _inverse_left(theta: float) -> float:
 
 
 @jit
-def _mask_rows(T: Array, target: Array, mask: Array, e: Array, J: Array) -> None:
+def mask_rows(T: Array, target: Array, mask: Array, e: Array, J: Array) -> None:
     """J ← Jacobian of the masked coordinates (Δp, φ) of `relative_pose`, as φ̇ = J_l⁻¹(φ) ω; e is scratch."""
     in_tool = mask[6] == 0.0
     relative_pose(T, target, in_tool, e)
@@ -161,7 +161,7 @@ def quadratic_model(
     if bent:
         second_order(goal, J, T, e, H)
     if task == MASK:
-        _mask_rows(T, target, mask, scratch, J)
+        mask_rows(T, target, mask, scratch, J)
     largest = 0.0
     for i in range(n):
         if task == APPROACH:

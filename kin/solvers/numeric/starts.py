@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.common import UNBOUNDED
 from kin.solvers.numeric.descent import descend
 from kin.solvers.numeric.error import Goal
 from kin.solvers.numeric.step import Bounds
@@ -38,6 +40,26 @@ def each_of(model: Array, goal: Goal, bounds: Bounds, enough: float, meetings: i
             met += 1
         best = min(best, cost)
     return count
+
+
+def descend_freely(
+    model: Array, T: Array, task: int, starts: Array, held: Sequence[int] = ()
+) -> tuple[Array, Array]:
+    """Where descents from the starts ``(k, n)`` end, and their errors ``(k,)``; a radian is worth a metre.
+
+    There are no limits, but the joints `held` stay as they are.
+    """
+    rows, errors = np.array(starts, order="C"), np.empty(len(starts))
+    goal = (np.ascontiguousarray(T), task, np.append(np.ones(6), 0.0), 1.0)
+    upper = np.full(rows.shape[1], UNBOUNDED)
+    lower, turns = -upper, np.zeros(len(upper))
+    if not held:
+        each_of(model, goal, (lower, upper, turns), -1.0, len(rows) + 1, rows, errors)
+        return rows, errors
+    for k in range(len(rows)):
+        lower[held] = upper[held] = rows[k, held]
+        each_of(model, goal, (lower, upper, turns), -1.0, 2, rows[k : k + 1], errors[k : k + 1])
+    return rows, errors
 
 
 @jit

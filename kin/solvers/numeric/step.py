@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
+from kin.kernels.dense import packed, solve_positive
 from kin.transforms import Array
 
 Bounds = tuple[Array, Array, Array]  # lower, upper, turns
@@ -18,39 +19,23 @@ STRIDE = 1.5  # radians or metres of one joint in one step at most
 def solve_free(H: Array, g: Array, free: NDArray[np.bool_], damping: float, L: Array, x: Array) -> bool:
     """x ← (H + damping · I)⁻¹ g on the free indices, given x on the others; False if that is not positive.
 
-    Cholesky on the lower triangle; L ``(n, n)`` is scratch.
+    H is a lower triangle; L ``(n, n)`` is scratch.
     """
-    n = g.shape[0]
+    n, k = g.shape[0], 0
+    m, y = packed(H, free, L), np.empty(n)
     for i in range(n):
-        if not free[i]:
-            continue
-        right = g[i]
-        for j in range(n):
-            if not free[j]:
-                right -= (H[i, j] if j < i else H[j, i]) * x[j]
-        for j in range(i):
-            if free[j]:
-                total = H[i, j]
-                for k in range(j):
-                    if free[k]:
-                        total -= L[i, k] * L[j, k]
-                L[i, j] = total / L[j, j]
-                right -= L[i, j] * x[j]
-        total = H[i, i] + damping
-        for k in range(i):
-            if free[k]:
-                total -= L[i, k] * L[i, k]
-        if total <= 1e-300:
-            return False
-        L[i, i] = math.sqrt(total)
-        x[i] = right / L[i, i]
+        if free[i]:
+            y[k] = g[i]
+            for j in range(n):
+                if not free[j]:
+                    y[k] -= (H[i, j] if j < i else H[j, i]) * x[j]
+            k += 1
+    if not solve_positive(L, m, damping, 0.0, y):
+        return False
     for i in range(n - 1, -1, -1):
         if free[i]:
-            total = x[i]
-            for k in range(i + 1, n):
-                if free[k]:
-                    total -= L[k, i] * x[k]
-            x[i] = total / L[i, i]
+            k -= 1
+            x[i] = y[k]
     return True
 
 

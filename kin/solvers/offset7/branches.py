@@ -13,9 +13,10 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.solvers.canonical import canonical_pose
-from kin.solvers.common import clear, wrap, zyz
+from kin.solvers.common import clear, zyz
 from kin.solvers.offset7.geometry import (
     A1,
     A3,

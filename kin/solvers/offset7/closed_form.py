@@ -11,7 +11,6 @@ from functools import cache
 import numpy as np
 
 from kin.axes import inverse
-from kin.fk import jacobian
 from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
@@ -34,7 +33,6 @@ from kin.solvers.offset7.branches import branches_many, branches_one, chain_valu
 from kin.solvers.offset7.geometry import REACH, SIN2, Geometry, geometry_of
 from kin.solvers.offset7.places import SAMPLES
 from kin.solvers.offset7.ranges import INTERVALS
-from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
 NAME = "offset7"
@@ -141,10 +139,6 @@ class Offset7(ClosedForm):
         middle = math.atan2(params[SIN2] * y0, params[SIN2] * y1)
         sines = math.sin(t[3] - self.geometry.elbow), math.sin(t[2] - middle), math.sin(t[5])
         return sum(weight * int(sine < 0.0) for weight, sine in zip((4, 2, 1), sines, strict=True))
-
-    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """The smallest singular value of the Jacobian: where it vanishes has no simple form."""
-        return those_within(within, by_jacobian(jacobian(self.robot, q), rank=6))
 
 
 def _beside(noun: str, what: str, joints: tuple[int, int], sense: float) -> Part:

@@ -12,11 +12,12 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import TURN, atan2, sin_cos, widest
+from kin.kernels.simd import atan2, sin_cos, widest
 from kin.solvers.blocks import Entries, rows_of
 from kin.solvers.canonical import canonical_pose
-from kin.solvers.common import HIGH, LOW, NEAR, wrap
+from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.offset7.branches import all_branches, distances
 from kin.solvers.offset7.geometry import D1, OFFSET, REACH, REVERSED, SIGN, Y4
 from kin.tolerances import TOLERANCES

@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.kernels.compile import jit
-from kin.kernels.simd import TURN, rounded, widest, wrapped
+from kin.kernels.simd import rounded, widest, wrapped
 from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.offset7.lanes import ANGLES, ELBOW, STRIDE, VALUE, lanes
 from kin.solvers.offset7.lanes import SIDE as LANE_SIDE

@@ -11,7 +11,6 @@ from kin.axes import is_zero
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last
-from kin.solvers.common import TURN
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -45,7 +44,7 @@ def match(robot: Robot) -> Pair2 | None:
 
 def kernels_of(robot: Robot, task: int) -> BatchKernels:
     """The batch kernels of one or two joints for a task."""
-    return BatchKernels(geometry_of(robot).params(task), branches_one, branches_many)
+    return BatchKernels(geometry_of(robot).params(task), branches_one, branches_many, seeded=solve_many)
 
 
 class Pair2(ClosedForm):
@@ -118,22 +117,13 @@ class Pair2(ClosedForm):
         arcs = free_last(p, q)
         return Candidates(q, q[:, -1:].copy(), (arcs,), gap, obstacle)
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The configurations of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
-
     def branch_of(self, q: Array) -> int:
         """The side of the elbow, or the row of q ``(n,)`` among all configurations of its pose."""
         if self.geometry.rows == 1:
             return 0
         if self.named:
             return int(math.sin(q[1] - straight(self.geometry)) < 0.0)
-        out = np.empty((2, 2))
-        near = np.array(q, dtype=np.float64)
-        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
-        apart = np.where(self.geometry.turns, np.abs((out - q + math.pi) % TURN - math.pi), np.abs(out - q))
-        apart = np.where(np.isnan(apart), math.inf, apart).max(axis=1)
-        return int(np.argmin(apart))
+        return super().branch_of(q)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The smallest singular value of the point's Jacobian that is not zero everywhere."""

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.solvers.blocks import solve_each
-from kin.solvers.common import wrap
 from kin.solvers.contract import POSE, POSITION
 from kin.solvers.pair2.geometry import (
     FIXED,

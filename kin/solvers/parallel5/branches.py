@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import canonical_pose, signed_box
-from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum, wrap
+from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum
 from kin.solvers.contract import POSE, POSITION
 from kin.solvers.parallel5.geometry import A1, A2, A3, ALONG, BESIDE, OFFSET, ROLLS, SIGN, TOOL_Z, P, Q
 from kin.solvers.parallel5.geometry import HIGH as MOST

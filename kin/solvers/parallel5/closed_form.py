@@ -50,7 +50,7 @@ class Parallel5(ClosedForm):
             "axes 2, 3 and 4 are parallel and perpendicular to axis 1" + ", and axis 5 to them" * self.rolls
         )
         self.lengths = (g.a1, g.a2, g.a3, g.p, g.q, g.beside)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -100,10 +100,6 @@ class Parallel5(ClosedForm):
         missing = bool(np.isnan(q[:, 0]).all())
         obstacle = Obstacle("last axis beyond the links' reach") if missing else None
         return Candidates(q, values, tuple(ranges), max(gap, 0.0) if missing else 0.0, obstacle)
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The branches of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def _x(self, t: Array) -> float:
         """How far C is before axis 1 in the arm's own plane, metres."""

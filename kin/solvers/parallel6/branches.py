@@ -10,12 +10,13 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
 from kin.solvers.blocks import Entries, is_wanted, solve_each
 from kin.solvers.canonical import canonical, signed_box
-from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, wrap
+from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row
 from kin.solvers.parallel6.geometry import A1, A2, A3, A4, BESIDE, COS_TWIST, D5, OFFSET, SIGN, SIN_TWIST
 from kin.solvers.planar import planar_angles, planar_free, two_links
 from kin.tolerances import TOLERANCES

@@ -52,7 +52,7 @@ class Parallel6(ClosedForm):
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.a1, g.a2, g.a3, g.a4, g.d5, g.beside)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(6))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -107,10 +107,6 @@ class Parallel6(ClosedForm):
         return float(
             g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
         )
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The branches of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """Of many poses the branch nearest to the seed."""

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.solvers.canonical import signed_box
-from kin.solvers.common import NEAR, UNBOUNDED, clear, wrap
+from kin.solvers.common import NEAR, UNBOUNDED, clear
 from kin.solvers.contract import POSE
 from kin.solvers.planar import LINKS, TOOL_X, TOOL_Y, held, planar_free
 from kin.transforms import Array

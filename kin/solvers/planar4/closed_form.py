@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.axes import frame_of, inverse, is_along, is_zero, lines_of, perpendicular_to
 from kin.fk import jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import at_every_turn, turn_around
-from kin.solvers.common import TURN
 from kin.solvers.contract import (
     APPROACH,
     POSE,

@@ -18,21 +18,19 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, excess, wrap
 from kin.kernels.compile import jit
 from kin.solvers.canonical import signed_box
 from kin.solvers.common import (
     HIGH,
     LOW,
     NEAR,
-    TURN,
     UNBOUNDED,
     clear,
-    excess,
     extend_arcs,
     lay_probes,
     misfit_of,
     nearest_in_arcs,
-    wrap,
 )
 from kin.solvers.contract import POSITION
 from kin.solvers.planar import (

@@ -6,9 +6,9 @@ little (:mod:`kin.solvers.rounded.table`). That arm's closed form gives the post
 exact on the true table (:mod:`kin.solvers.rounded.closed_form`).
 
 With seven joints each posture is a point of a curve, the self-motion of the table
-(:mod:`kin.solvers.rounded.motion`). The family gives the structure, and the table the numbers
+(:mod:`kin.solvers.selfmotion`). The family gives the structure, and the table the numbers
 (:mod:`kin.solvers.rounded.seven`): ends of intervals (:mod:`kin.solvers.rounded.ends`), whole curves where the
-structure is in doubt (:mod:`kin.solvers.rounded.tracing`), and the posture of each branch
+structure is in doubt (:mod:`kin.solvers.selfmotion.tracing`), and the posture of each branch
 (:mod:`kin.solvers.rounded.rows`).
 """
 

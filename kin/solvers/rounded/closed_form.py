@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import wrapped
 from kin.axes import size
 from kin.robot import Robot
-from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -17,18 +17,16 @@ from kin.solvers.contract import (
     BatchKernels,
     Candidates,
     ClosedForm,
-    RedundancyParameter,
     SolverInput,
+    WrappedForm,
     weakest,
 )
-from kin.solvers.numeric import each_of
+from kin.solvers.numeric import descend_freely
 from kin.solvers.reversed import WrappedKernels
 from kin.solvers.rounded.six import SixJoints
-from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
 Flags = NDArray[np.bool_]
-_MASK = np.array([1.0] * 6 + [0.0])
 _MOVED = 0.1  # rad, m: a descent that goes farther has left the posture
 _DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
 # Where two limits of the reach meet, only a motion away from both leads back.
@@ -40,7 +38,7 @@ _MARGIN = 10.0  # times the rounding: how far from a target starts are looked fo
 _ABOUT = 1e-9  # m, rad: what is closer needs no descent with another task
 
 
-class Rounded(ClosedForm):
+class Rounded(WrappedForm):
     """The closed form of the nominal arm of a rounded table; its postures are exact on the table itself.
 
     Ranges of redundancy parameters and distances to singularities are those of the nominal arm. A row whose
@@ -61,14 +59,6 @@ class Rounded(ClosedForm):
         self._six = SixJoints(robot, form, off) if robot.n == 6 else None
         self._margin = _MARGIN * off * size(robot)
         self.kernels = self._kernels(form.kernels)
-
-    def handles(self, task: int) -> bool:
-        """The tasks of the family."""
-        return self.form.handles(task)
-
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """Those of the family."""
-        return self.form.redundancies(task)
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches, each moved onto the target on the true table; requested values are kept."""
@@ -119,28 +109,13 @@ class Rounded(ClosedForm):
         for code in (task,) if self.robot.n >= 6 else dict.fromkeys((task, max(task, APPROACH), POSITION)):
             if not len(there):
                 break
-            rows, errors = self._descend(T, code, q[there], held)
+            rows, errors = descend_freely(self.robot.model, T, code, q[there], held)
             near = np.abs(rows - q[there]).max(axis=1) < _MOVED
             met = near & (errors < _ABOUT)
             out[there[met]] = rows[met]
             there = there[~met]
         out[there[~known[there]]] = math.nan
         return out, not known[there].any()
-
-    def _descend(self, T: Array, code: int, q: Array, held: list[int]) -> tuple[Array, Array]:
-        """Where descents from the rows end, and the errors there."""
-        rows, errors = q.copy(), np.empty(len(q))
-        lower, upper = np.full(self.robot.n, -UNBOUNDED), np.full(self.robot.n, UNBOUNDED)
-        goal = (np.ascontiguousarray(T), code, _MASK, 1.0)
-        turns = np.zeros(self.robot.n)
-        model = self.robot.model
-        if not held:
-            each_of(model, goal, (lower, upper, turns), -1.0, len(q) + 1, rows, errors)
-            return rows, errors
-        for k in range(len(q)):
-            lower[held] = upper[held] = q[k, held]
-            each_of(model, goal, (lower, upper, turns), -1.0, 2, rows[k : k + 1], errors[k : k + 1])
-        return rows, errors
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
         """The batch kernels: those of the family, and a descent for each row."""
@@ -168,11 +143,9 @@ class Rounded(ClosedForm):
 
     def _wrapped(self, q: Array, held: list[int]) -> Array:
         """The same with angles in (−π, π], but for joints whose values may be requested."""
-        out = q.copy()
-        for i in np.flatnonzero(self.robot.revolute).tolist():
-            if i not in held:
-                out[:, i] = math.pi - (math.pi - q[:, i]) % (2.0 * math.pi)
-        return out
+        turns = self.robot.revolute.copy()
+        turns[held] = False
+        return np.where(turns, wrapped(q), q)
 
     def value_at(self, T: Array, q: Array) -> float:
         """The redundancy parameter of the nominal arm."""
@@ -181,7 +154,3 @@ class Rounded(ClosedForm):
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on, as the family has it."""
         return self.form.branch_of(q)
-
-    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """Those of the nominal arm."""
-        return self.form.singularities(q, within)

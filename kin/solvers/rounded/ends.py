@@ -1,10 +1,10 @@
-"""Ends of feasible intervals on a typed table, from those of the arm that was meant.
+"""Ends of feasible intervals on a table as entered, from those of the nominal arm.
 
-The arm that was meant says what happens at an end: a joint meets a limit, the given joint turns back, or its own
-range ends. Newton's method then finds where that happens on the typed table (:mod:`kin.solvers.rounded.motion`).
+The nominal arm says what happens at an end: a joint meets a limit, the given joint turns back, or its own range
+ends. Newton's method finds where that happens on the table as entered (:mod:`kin.solvers.selfmotion.points`).
 
 It is the same structure only if no interval appears, vanishes, divides or joins between the two tables. So it
-counts as certain only where the arm that was meant has the same intervals with limits and reach a little narrower,
+counts as certain only where the nominal arm has the same intervals with limits and reach a little narrower,
 and a little wider, and where between the two ends of these nothing else can happen: there one joint goes straight
 through its limit, and the others stay away from theirs (`_is_alone`). Else a joint could leave its limits and come
 back between these ends unseen, and the interval would be two.
@@ -14,14 +14,24 @@ from __future__ import annotations
 
 import math
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
-from kin.solvers.common import TURN, wrap
-from kin.solvers.rounded.motion import FOLD, OFF, SPAN, Point, Task, arrive, dial_of, new_point, task_of
-from kin.tolerances import TOLERANCES
+from kin.solvers.selfmotion.points import (
+    FOLD,
+    OFF,
+    SPAN,
+    Point,
+    Task,
+    is_inside,
+    new_point,
+    newton_to_event,
+    redundancy_value,
+    slack_of,
+    task_of,
+)
 from kin.transforms import Array
 
-_ACTIVE = 1e-7  # rad: a joint of the arm that was meant is at its limit
-_SLACK = TOLERANCES.limit
+_ACTIVE = 1e-7  # rad: a joint of the nominal arm is at its limit
 _BOUND = 1e-10  # rad: an end of the joint's own range
 _WHOLE = TURN - 1e-9
 # Rad; times the rounding; at a fold times its root: a posture that moves farther may be another one.
@@ -33,15 +43,6 @@ _FIXED, _LOST = -4, -5  # the end of the joint's own range; nothing that is know
 
 
 @jit
-def slack_of(lower: Array, upper: Array, y: Array, c: int) -> float:
-    """How far joint c is inside its limits at its best whole turn; infinite where they leave a whole turn."""
-    half = 0.5 * (upper[c] - lower[c])
-    if half >= math.pi:
-        return math.inf
-    return float(half - abs(wrap(y[c] - 0.5 * (lower[c] + upper[c]))))
-
-
-@jit
 def limit_near(lower: Array, upper: Array, y: Array, c: int) -> float:
     """The value of joint c, at the whole turn of y ``(7,)``, at which it meets the nearer one of its limits."""
     off = wrap(y[c] - 0.5 * (lower[c] + upper[c]))
@@ -49,17 +50,8 @@ def limit_near(lower: Array, upper: Array, y: Array, c: int) -> float:
 
 
 @jit
-def is_inside(lower: Array, upper: Array, y: Array, but: int) -> bool:
-    """Whether all joints but one are inside their limits."""
-    inside = True
-    for c in range(7):
-        inside = inside and (c == but or slack_of(lower, upper, y, c) >= -_SLACK)
-    return inside
-
-
-@jit
 def _what_ends(task: Task, limits: Array, span: tuple[float, float], end: float, y: Array) -> int:
-    """What happens at an end where the arm that was meant, with wider limits, has the posture y.
+    """What happens at an end where the nominal arm, with wider limits, has the posture y.
 
     FOLD, _FIXED or the joint that meets a limit.
     """
@@ -139,7 +131,7 @@ def move_ends(
     model: Array, T: Array, setting: Array, limits: Array, known: Array, ends: Array, places: Array, out: Array,
     sure: Array,
 ) -> None:  # fmt: skip
-    """out ``(m, 3)`` ← the intervals of the typed table, from those of the arm that was meant.
+    """out ``(m, 3)`` ← the intervals of the table as entered, from those of the nominal arm.
 
     sure ``(8,)`` ← 1.0 for each branch whose intervals certainly have the same structure; the others are in doubt.
 
@@ -190,8 +182,8 @@ def move_ends(
 def _is_alone(limits: Array, what: int, apart: float, postures: tuple[Array, Array, Array], n: Array) -> bool:
     """Whether nothing else happens between an end with narrower limits and the same one with wider ones.
 
-    apart: of these two in the parameter; postures: those at the two, and between them that of the typed table,
-    where the curve has the direction n ``(7,)``.
+    apart: of these two in the parameter; postures: those at the two, and between them that of the
+    table as entered, where the curve has the direction n ``(7,)``.
     """
     if what == _FIXED:
         return apart < _BOUND
@@ -223,7 +215,7 @@ def _is_whole(branch: int, arcs: Array) -> bool:
 def _moved_end(
     task: Task, limits: Array, span: tuple[float, float], off: float, y: Array, arc: Array, side: int, p: Point
 ) -> int:
-    """arc[1 + side] ← an end on the typed table, y ``(7,)`` ← the posture there; what happens there, or _LOST."""
+    """arc[1 + side] ← an end on the table as entered, y ``(7,)`` ← the posture there; what happens, or _LOST."""
     lower, upper = limits[0], limits[1]
     if math.isnan(y[0]):
         return _LOST
@@ -231,11 +223,11 @@ def _moved_end(
     what = _what_ends(task, limits, span, end, y)
     start = y.copy()
     if what == _FIXED:
-        met = arrive(task, task.joint, end, y, p)
+        met = newton_to_event(task, task.joint, end, y, p)
     elif what == FOLD:
-        met = task.joint >= 0 and arrive(task, FOLD, 0.0, y, p)
+        met = task.joint >= 0 and newton_to_event(task, FOLD, 0.0, y, p)
     else:
-        met = arrive(task, what, limit_near(lower, upper, y, what), y, p)
+        met = newton_to_event(task, what, limit_near(lower, upper, y, what), y, p)
     if not met or not is_inside(lower, upper, y, what):
         return _LOST
     most = min(_MOVED, _MOVED_ROOT * math.sqrt(off) if what == FOLD else _MOVED_BY * off)
@@ -243,6 +235,6 @@ def _moved_end(
         if not abs(y[c] - start[c]) < most:
             return _LOST
     if what != _FIXED:
-        value = dial_of(task, y)
+        value = redundancy_value(task, y)
         arc[1 + side] = end + wrap(value - end) if task.joint < 0 else value
     return what

@@ -1,4 +1,4 @@
-"""Postures of a typed table: rows of the arm that was meant, moved onto the target on the table as it is."""
+"""Postures of a table as entered: rows of the nominal arm, moved onto the target on the table as it is."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
-from kin.solvers.common import wrap
-from kin.solvers.rounded.ends import is_inside
-from kin.solvers.rounded.motion import (
+from kin.solvers.selfmotion.points import (
     FRAME,
     JOINT,
     MOST,
@@ -17,11 +16,12 @@ from kin.solvers.rounded.motion import (
     WANTED,
     Point,
     Task,
-    dial_of,
-    look,
+    correct,
+    is_inside,
+    linearize,
     new_point,
+    redundancy_value,
     set_frame,
-    settle,
     task_of,
 )
 from kin.tolerances import TOLERANCES
@@ -48,12 +48,12 @@ def move_row(task: Task, value: float, most: float, y: Array, p: Point) -> bool:
     most: rad; a row that has to move farther does not belong to the posture.
     """
     start = y.copy()
-    return settle(task, value, 0.0, y, p) and _away(y, start) < most
+    return correct(task, value, 0.0, y, p) and _away(y, start) < most
 
 
 @jit
 def _reach(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
-    """As `settle`, in shorter steps along the curve where one is too long for Newton's method.
+    """As `correct`, in shorter steps along the curve where one is too long for Newton's method.
 
     Beside a fold postures move by the root of what the parameter does, beside a singular wrist joints turn fast.
     """
@@ -61,9 +61,9 @@ def _reach(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
     for _ in range(_STRIDES):
         goal = value
         if share < 1.0:
-            at = dial_of(task, y)
+            at = redundancy_value(task, y)
             goal = at + share * wrap(value - at)
-        if settle(task, goal, sense, y, p):
+        if correct(task, goal, sense, y, p):
             if share == 1.0:
                 return True
             last[:], share = y, 1.0
@@ -100,13 +100,13 @@ def _row_in(
 ) -> bool:
     """y ``(7,)`` ← the posture at a value inside an interval with the postures `places` ``(3, 7)``."""
     lower, upper = limits
-    if not look(task, places[INSIDE], p) < 1.0:
+    if not linearize(task, places[INSIDE], p) < 1.0:
         return False
     sense = p.n[task.joint] if task.joint >= 0 else 0.0
     off = np.empty(4)
     for i in range(4):
         start = row if i == 3 else places[i]
-        off[i] = abs(wrap(dial_of(task, start) - value)) if not math.isnan(start[0]) else math.inf
+        off[i] = abs(wrap(redundancy_value(task, start) - value)) if not math.isnan(start[0]) else math.inf
     off[3] *= 0.5  # of two that are as close, the row
     for _ in range(4):
         i = 0
@@ -130,7 +130,7 @@ def _row_in(
 def choose_rows(
     model: Array, T: Array, setting: Array, limits: Array, arcs: Array, places: Array, rows: Array
 ) -> int:
-    """rows ``(8, 8)`` ← each branch of the typed table and its value, from those of the arm that was meant.
+    """rows ``(8, 8)`` ← each branch of the table as entered and its value, from those of the nominal arm.
 
     Where a branch has intervals, its row is at their value nearest to the wanted one, or to its own if none is
     wanted; else it keeps its value. Returns bits: which branches are not where they should be.
@@ -180,7 +180,7 @@ def rows_at(task: Task, value: float, most: float, rows: Array) -> None:
     for k in range(rows.shape[0]):
         if math.isnan(rows[k, 0]):
             continue
-        at = dial_of(task, rows[k]) if math.isnan(value) else value
+        at = redundancy_value(task, rows[k]) if math.isnan(value) else value
         if not move_row(task, at, most, rows[k], p):
             for c in range(7):
                 rows[k, c] = math.nan
@@ -188,7 +188,7 @@ def rows_at(task: Task, value: float, most: float, rows: Array) -> None:
 
 @jit
 def move_rows(model: Array, params: Array, T: Array, setting: Array, values: Array, out: Array) -> None:
-    """out ``(N, k, 7)`` ← rows of the arm that was meant at each of the targets T ``(N, 4, 4)``, moved onto these.
+    """out ``(N, k, 7)`` ← rows of the nominal arm at each of the targets T ``(N, 4, 4)``, moved onto these.
 
     Args:
         model, setting: as for `task_of`.

@@ -2,7 +2,7 @@
 
 The family gives the structure, the table as entered the numbers. First the ends of the intervals are moved from
 the nominal arm to the table as entered (:mod:`kin.solvers.rounded.ends`). If the structure is in doubt, the
-self-motions of the table as entered are followed (:mod:`kin.solvers.rounded.tracing`). Then each branch gets
+self-motions of the table as entered are followed (:mod:`kin.solvers.selfmotion.tracing`). Then each branch gets
 its row strictly inside the interval, with the redundancy parameter held (:mod:`kin.solvers.rounded.rows`).
 """
 
@@ -16,20 +16,20 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import TURN, apart, wrapped
 from kin.axes import size
 from kin.fk import fk, jacobian
 from kin.kernels.compile import MODEL, direct, record, row_of
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
-from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, POSE, BatchKernels, Candidates, ClosedForm, Completeness, SolverInput
 from kin.solvers.reversed import ReversedJoints, WrappedKernels
 from kin.solvers.rounded.closed_form import Flags, Rounded
 from kin.solvers.rounded.ends import joined, move_ends
-from kin.solvers.rounded.motion import FRAME, JOINT, MOST, OFF, SETTING, SPAN, WANTED, set_frame
 from kin.solvers.rounded.rows import choose_rows, move_rows
-from kin.solvers.rounded.tracing import CURVES, PATHS, PIECES, Paths, trace
+from kin.solvers.selfmotion.points import FRAME, JOINT, MOST, OFF, SETTING, SPAN, WANTED, set_frame
+from kin.solvers.selfmotion.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -269,7 +269,7 @@ class Rounded7(Rounded):
         self._move_rows(p, setting, q)
         half = 0.5 * (p.upper - p.lower)
         middle = np.add(p.lower, half, where=np.isfinite(half), out=np.zeros_like(half))
-        off = np.abs(rolled.wrapped(q - middle))
+        off = np.abs(wrapped(q - middle))
         inside = np.flatnonzero(((off <= half + TOLERANCES.limit) | (half >= math.pi)).all(axis=1))
         arcs = np.column_stack([inside, np.full((len(inside), 2), value)]).astype(np.float64)
         return arcs, np.repeat(q[inside][:, None], 3, axis=1)
@@ -335,7 +335,7 @@ class Rounded7(Rounded):
         """
         k = np.arange(len(values))
         rows = self._all_at(p, values.ravel()).reshape(-1, 3, 8, 7)
-        away = np.abs(rolled.wrapped(rows - postures[:, :, None])).max(axis=3)
+        away = apart(rows, postures[:, :, None])
         away[np.isnan(away)] = math.inf
         first = away.argmin(axis=2)
         nearest, next_one = np.moveaxis(np.partition(away, 1, axis=2)[:, :, :2], 2, 0)
@@ -408,8 +408,7 @@ class _Found:
 
 def _merged(rows: Array) -> Flags:
     """Which of the rows ``(8, 7)``, NaN where a branch has none, are the posture of another branch, too."""
-    away = np.abs(rolled.wrapped(rows[:, None] - rows)).max(axis=2)
-    return np.asarray((away < _SAME).sum(axis=1) > 1)
+    return np.asarray((apart(rows[:, None], rows) < _SAME).sum(axis=1) > 1)
 
 
 def _have(arcs: Array, value: float) -> Flags:

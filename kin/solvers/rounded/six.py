@@ -21,19 +21,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import apart
 from kin.axes import size
 from kin.fk import fk, jacobian
 from kin.robot import Robot
-from kin.solvers.common import TURN, UNBOUNDED
 from kin.solvers.contract import POSE, ClosedForm, Completeness
 from kin.solvers.curves import curves_among
 from kin.solvers.general6 import General6
 from kin.solvers.general6 import match as general
-from kin.solvers.numeric import each_of
+from kin.solvers.numeric import descend_freely
 from kin.transforms import Array
 
 Flags = NDArray[np.bool_]
-_MASK = np.array([1.0] * 6 + [0.0])
 _JOINTS = np.arange(6)
 _REGULAR = 2.5  # times the root of the rounding: singular values of regular postures
 _MOVED = 20.0  # times the rounding, over the singular value: how far a regular posture moves at most
@@ -79,15 +78,15 @@ class SixJoints:
         rows = rows[np.abs(fk(self.robot, rows) - T).max(axis=(1, 2), initial=0.0) < _MET]
         there = ~np.isnan(q[:, 0])
         there[there] = np.abs(fk(self.robot, q[there]) - T).max(axis=(1, 2), initial=0.0) < _MET
-        nearest = [_apart(rows, row) for row in q[there]] if len(rows) else []
-        among = len(nearest) == int(there.sum()) and all(apart.min() < _AMONG for apart in nearest)
+        nearest = [apart(rows, row) for row in q[there]] if len(rows) else []
+        among = len(nearest) == int(there.sum()) and all(away.min() < _AMONG for away in nearest)
         sure = known == "proved" or (known == "agreed" and len(rows) == there.sum())
         if curves or not (sure and among and 0 < len(rows) <= len(q) and len(rows) % 2 == 0):
             return self._in_rows(q, there, rows), "unknown"
         # The exact ones, each in the row of the posture that was found near it.
         exact = np.full_like(q, math.nan)
-        for place, apart in zip(np.flatnonzero(there).tolist(), nearest, strict=True):
-            exact[place] = rows[int(apart.argmin())]
+        for place, away in zip(np.flatnonzero(there).tolist(), nearest, strict=True):
+            exact[place] = rows[int(away.argmin())]
         exact, there = _each_once(exact, there)
         return self._in_rows(exact, there, rows), "agreed"
 
@@ -97,7 +96,7 @@ class SixJoints:
         there = given & ~np.isnan(q[:, 0])
         there[there] = np.abs(fk(self.robot, q[there]) - T).max(axis=(1, 2), initial=0.0) < _MET
         sigma = self._weak(q[there])[0][:, 0]
-        moved = _apart(q[there], starts[there])
+        moved = apart(q[there], starts[there])
         regular = there.copy()
         regular[there] = (sigma > _REGULAR * math.sqrt(self.off)) & (moved * sigma < _MOVED * self.off)
         as_exact = np.array_equal(given, ~np.isnan(exact[:, 0]))
@@ -128,8 +127,8 @@ class SixJoints:
         agreed = len(found) == len(sets[0]) == len(sets[1]) <= len(q) and not flat.any()
         # As many as the family has at most: what stalled is none. With fewer, both sets may have missed a pair.
         agreed &= len(found) + curves == len(q)
-        apart = bool((self._weak(found)[0][:, 0] > _DOUBLE).all())
-        even = curves > 0 or (len(found) % 2 == 0 and apart)
+        single = bool((self._weak(found)[0][:, 0] > _DOUBLE).all())
+        even = curves > 0 or (len(found) % 2 == 0 and single)
         return self._in_rows(q, there, found), "agreed" if agreed and even and len(found) else "unknown"
 
     def _weak(self, q: Array) -> tuple[Array, Array]:
@@ -142,9 +141,7 @@ class SixJoints:
 
         A descent creeps in the valley between two postures that have almost merged. Newton's steps leave it.
         """
-        rows, errors, wide = starts.copy(), np.empty(len(starts)), np.full(6, UNBOUNDED)
-        goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
-        each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(rows) + 1, rows, errors)
+        rows, errors = descend_freely(self.robot.model, T, POSE, starts)
         beside = _unique(rows[(errors >= _MET) & (errors < _NEAR * self.size)])
         ends, met = self._newton(T, beside)
         others, reached = self._newton(T, self._across(T, beside[~met]).reshape(-1, 6))
@@ -178,7 +175,7 @@ class SixJoints:
         for _ in range(_NEWTON if len(q) else 0):
             inverse = np.linalg.pinv(self._jacobian(out), rcond=1e-14)
             out = out + np.clip(np.einsum("kij,kj->ki", inverse, self._errors(T, out)), -1.0, 1.0)
-        met = (np.abs(self._errors(T, out)).max(axis=1, initial=0.0) < 0.1 * _MET) & (_apart(out, q) < _CLOSE)
+        met = (np.abs(self._errors(T, out)).max(axis=1, initial=0.0) < 0.1 * _MET) & (apart(out, q) < _CLOSE)
         return np.where(met[:, None], out, q), met
 
     def _across(self, T: Array, q: Array) -> Array:
@@ -213,7 +210,7 @@ class SixJoints:
         """The rows ``(k, 6)`` with what was found besides in the rows of its branch, or in any that are free."""
         out, free = q.copy(), ~there
         for row in found:
-            if (_apart(q[there], row) < _SAME).any() or not free.any():
+            if (apart(q[there], row) < _SAME).any() or not free.any():
                 continue
             own = self.form.branch_of(row)
             place = own if free[own] else int(np.flatnonzero(free)[0])
@@ -221,16 +218,11 @@ class SixJoints:
         return out
 
 
-def _apart(a: Array, b: Array) -> Array:
-    """The largest joint difference ``(k,)``, whole turns aside."""
-    return np.asarray(np.abs((a - b + math.pi) % TURN - math.pi).max(axis=1, initial=0.0))
-
-
 def _each_once(q: Array, there: Flags) -> tuple[Array, Flags]:
     """The rows ``(k, 6)`` that are there, of equal ones the first; the others are NaN."""
     out, kept = q.copy(), there.copy()
     for i in np.flatnonzero(there)[1:].tolist():
-        if (_apart(out[:i][kept[:i]], out[i]) < _SAME).any():
+        if (apart(out[:i][kept[:i]], out[i]) < _SAME).any():
             out[i], kept[i] = math.nan, False
     return out, kept
 
@@ -238,7 +230,7 @@ def _each_once(q: Array, there: Flags) -> tuple[Array, Flags]:
 def _unique(rows: Array) -> Array:
     """The configurations ``(k, 6)``, each once."""
     kept: list[int] = []
-    same = np.abs((rows[:, None] - rows + math.pi) % TURN - math.pi).max(axis=2, initial=0.0) <= _SAME
+    same = apart(rows[:, None], rows) <= _SAME
     for i in range(len(rows)):
         if not same[i, kept].any():
             kept.append(i)

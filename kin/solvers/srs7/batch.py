@@ -10,11 +10,12 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import WIDE, sin_cos, widest
 from kin.solvers.blocks import OWN, VALUE, Arc, Entries, double, each, in_base, one, rows_of
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
-from kin.solvers.common import shifted, wrap
+from kin.solvers.common import shifted
 from kin.solvers.srs7.branches import solve
 from kin.solvers.srs7.geometry import REACH, radial_of
 from kin.tolerances import TOLERANCES

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
+from kin.angles import excess, nearest_image, wrap
 from kin.kernels.compile import jit
 from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
-from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, excess, nearest_image, wrap
+from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row
 from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, affine, angles_at, seed_arm_angle, sign_of, triangle_of
 from kin.solvers.srs7.minima import LANE_ROWS, LANES, best_of
 from kin.solvers.srs7.nearest import FARTHER, Work, add_best, add_others, refine

@@ -68,7 +68,7 @@ class Srs7(ClosedForm):
     def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -112,10 +112,6 @@ class Srs7(ClosedForm):
         elif code == TOO_NEAR:
             obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
         return Candidates(out[:, :7], values, tuple(all_arcs), gaps.item(0), obstacle)
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The branches of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def value_at(self, T: Array, q: Array) -> float:
         """The arm angle of a configuration."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import TURN, atan2, sin_cos, widest
-from kin.solvers.common import HIGH, LOW, NEAR, wrap
+from kin.kernels.simd import atan2, sin_cos, widest
+from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.srs7.minima import (
     AT,
     BRANCH,

@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import TURN, atan2, rounded, sin_cos, widest, wrapped
+from kin.kernels.simd import atan2, rounded, sin_cos, widest, wrapped
 from kin.solvers.common import (
     HIGH,
     LOW,

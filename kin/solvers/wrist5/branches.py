@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
 from kin.solvers.blocks import is_wanted, solve_each
 from kin.solvers.canonical import canonical_box
-from kin.solvers.common import clear, copy_row, merged, wrap
+from kin.solvers.common import clear, copy_row, merged
 from kin.solvers.wrist5.geometry import A1, A2, D4, D6, OFFSET, REACH, SINGULAR, wrist_angles
 from kin.solvers.wrist5.redundancy import choose_theta1
 from kin.transforms import Array

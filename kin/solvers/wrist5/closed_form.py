@@ -71,7 +71,7 @@ class Wrist5(ClosedForm):
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.a1, g.a2, g.d4, g.d6)
-        self.kernels = BatchKernels(g.parameters(), branches_one, branches_many)
+        self.kernels = BatchKernels(g.parameters(), branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(5))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -113,10 +113,6 @@ class Wrist5(ClosedForm):
             arcs[:, 1:] -= arm[OFFSET]
         obstacle = None if gap <= REACH else Obstacle("approach direction")
         return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The branches of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """Of many poses the branch nearest to the seed."""

@@ -6,19 +6,9 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
-from kin.solvers.common import (
-    HIGH,
-    LOW,
-    NEAR,
-    TURN,
-    add_roots,
-    extend_arcs,
-    lay_probes,
-    misfit_of,
-    nearest_in_arcs,
-    wrap,
-)
+from kin.solvers.common import HIGH, LOW, NEAR, add_roots, extend_arcs, lay_probes, misfit_of, nearest_in_arcs
 from kin.solvers.wrist5.geometry import wrist_angles
 from kin.transforms import Array
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
 from kin.solvers.blocks import Entries, is_wanted, solve_each
@@ -14,14 +15,12 @@ from kin.solvers.common import (
     HIGH,
     LOW,
     NEAR,
-    TURN,
     clear,
     copy_row,
     extend_arcs,
     lay_probes,
     misfit_of,
     nearest_in_arcs,
-    wrap,
     zyz,
     zyz_breaks,
 )

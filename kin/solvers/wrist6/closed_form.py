@@ -61,7 +61,7 @@ class Wrist6(ClosedForm):
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.a1, g.a2, g.f, g.beside)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(6))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -129,10 +129,6 @@ class Wrist6(ClosedForm):
         """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
         g = self.geometry
         return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
-
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
-        """The branches of many poses."""
-        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """Of many poses the branch nearest to the seed."""

@@ -27,9 +27,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.errors import InputError
+from kin.errors import InputError, finite_number
 from kin.fk import manipulability
-from kin.ik.options import JointConstraints, Limits, Locks, finite_number
+from kin.ik.options import JointConstraints, Limits, Locks
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.tolerances import TOLERANCES

@@ -26,12 +26,12 @@ from typing import Literal
 
 import numpy as np
 
+from kin.angles import TURN
 from kin.axes import screw_z
 from kin.fk import fk, jacobian
 from kin.ik.batch import ik_branches
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.common import TURN
 from kin.solvers.contract import APPROACH, POSE, ClosedForm, RedundancyParameter, SolverInput
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, frame_from_approach

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from kin.angles import nearest_image
 from kin.ik.candidates import residuals
 from kin.kernels.compile import jit
-from kin.kernels.jacobian import jacobian_into, volume_of
-from kin.solvers.common import nearest_image
+from kin.kernels.jacobian import jacobian_into, manipulability_of
 from kin.solvers.contract import APPROACH
 from kin.solvers.numeric import solve
 from kin.tolerances import TOLERANCES
@@ -66,13 +66,7 @@ def raise_best(arm: BoundedArm, turns: Array, rolls: bool, T: Array, q: Array, b
             position, rotation, _ = residuals(P, T[i], APPROACH, mask, e)
             if not (position <= _POSITION and rotation <= _ROTATION):
                 continue
-            for r in range(6):
-                for j in range(n):
-                    if n < 6:
-                        A[r, j] = J[r, j]
-                    else:
-                        A[j, r] = J[r, j]
-            best[i] = max(best[i], volume_of(A))
+            best[i] = max(best[i], manipulability_of(J, 0, 6, A))
 
 
 @jit

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.fk import BLOCK, HEADER, WIDTH, load_base, sine_cosine, x_part
+from kin.kernels.fk import BLOCK, load_base, sine_cosine, x_part, z_row
 from kin.kernels.simd import fma, sin_cos_quarters, widest
 from kin.transforms import Array
 from kin.workspace.region import BoundedArm
@@ -92,33 +92,18 @@ def sample_points(arm: BoundedArm, streams: Streams, start: int, out: Points) ->
             S[_Y + b] = model[22]
             S[_Z + b] = model[26]
         for i in range(int(model[0]) - 1, -1, -1):
-            k = HEADER + WIDTH * i
-            theta, d, kind, j = model[k], model[k + 1], model[k + 5], int(model[k + 6])
+            theta, d, j, turn, slide = z_row(model, i)
             a, ca, sa = x_part(model, i + ahead)
-            if kind == 0.0:
-                s, c = sine_cosine(theta)
-                for b in range(BLOCK):
-                    _move(S, b, s, c, d, a, ca, sa)
-                continue
             x = key[j] + np.uint64(start + first) * step[j]
             span = high[j] - low[j]
-            if kind == 4.0:
+            if turn == 0.0:
                 s, c = sine_cosine(theta)
-                ratio = model[k + 7]
                 for b in range(BLOCK):
-                    value = ratio * _value(x + offsets[j, b], quasi, low[j], span, high[j])
+                    value = slide * _value(x + offsets[j, b], quasi, low[j], span, high[j])
                     _move(S, b, s, c, d + value, a, ca, sa)
                 continue
-            if kind == 2.0:
-                s, c = sine_cosine(theta)
-                for b in range(BLOCK):
-                    _move(S, b, s, c, d + _value(x + offsets[j, b], quasi, low[j], span, high[j]), a, ca, sa)
-                continue
-            least = (theta + low[j]) * _QUARTERS
-            if kind == 3.0:
-                least = (theta + model[k + 7] * low[j]) * _QUARTERS
-                span *= model[k + 7]
-            span *= _QUARTERS
+            least = (theta + turn * low[j]) * _QUARTERS
+            span = span * turn * _QUARTERS
             # Numbers and kinematics in two loops: a processor cannot look ahead far enough to overlap the steps of
             # one loop that does both.
             if quasi:

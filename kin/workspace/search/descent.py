@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.kernels.dense import packed, solve_positive
 from kin.kernels.jacobian import jacobian_into
 from kin.transforms import Array
 from kin.workspace.region import BoundedArm
@@ -148,42 +149,18 @@ def _hessian(f: Array, work: Scratch) -> float:
 
 @jit
 def _newton_step(shift: float, work: Scratch) -> bool:
-    """work.step ← −(H + shift)⁻¹ slope on the free joints, by Cholesky; False if not positive definite."""
-    H, L, slope, free, step = work.H, work.L, work.slope, work.free, work.step
-    n = slope.shape[0]
-    for i in range(n):
-        step[i] = 0.0
-        if free[i] == 0.0:
-            continue
-        for j in range(i + 1):
-            if free[j] == 0.0:
-                continue
-            total = H[i, j]
-            if i == j:
-                total += shift
-            for k in range(j):
-                if free[k] != 0.0:
-                    total -= L[i, k] * L[j, k]
-            if i == j:
-                if not total > 1e-12 * (abs(H[i, i]) + shift):
-                    return False
-                L[i, i] = math.sqrt(total)
-            else:
-                L[i, j] = total / L[j, j]
-    for i in range(n):
-        if free[i] != 0.0:
-            total = -slope[i]
-            for k in range(i):
-                if free[k] != 0.0:
-                    total -= L[i, k] * step[k]
-            step[i] = total / L[i, i]
-    for i in range(n - 1, -1, -1):
-        if free[i] != 0.0:
-            total = step[i]
-            for k in range(i + 1, n):
-                if free[k] != 0.0:
-                    total -= L[k, i] * step[k]
-            step[i] = total / L[i, i]
+    """work.step ← −(H + shift)⁻¹ slope on the free joints; False if that is not positive definite."""
+    slope, free, step = work.slope, work.free, work.step
+    m, k = packed(work.H, free, work.L), 0
+    for i in range(slope.shape[0]):
+        if free[i]:
+            step[k] = -slope[i]
+            k += 1
+    if not solve_positive(work.L, m, shift, 1e-12, step):
+        return False
+    for i in range(slope.shape[0] - 1, -1, -1):
+        k -= 1 if free[i] else 0
+        step[i] = step[k] if free[i] else 0.0
     return True
 
 

@@ -16,9 +16,9 @@ from kin import InputError, Robot, Status
 from kin.ik import preferences
 from kin.solvers import closed_form_of, general7, offset7
 from kin.solvers.contract import POSE, SolverInput
-from kin.solvers.general7.motion import end_of_motion
 from kin.solvers.locked import form_with_locked
 from kin.solvers.reduced import fixed
+from kin.solvers.selfmotion.tracing import end_of_motion
 
 PI = math.pi
 PANDA = kin.get_robot("panda")
@@ -236,6 +236,16 @@ def test_a_self_motion_ends_at_a_limit_or_where_it_turns_back():
             ended.add("limit" if np.abs(room).min() < 1e-4 else "fold")
             assert np.abs(room).min() < 1e-4 or min(sigma) < 1e-2
     assert ended == {"limit", "fold"}
+
+
+def test_the_ends_of_self_motions_are_those_of_a_closed_form():
+    form, rng = closed_form_of(PANDA), np.random.default_rng(11)
+    for q in PANDA.random_q(rng, 12):
+        T, joint = kin.fk(PANDA, q), form.given
+        arcs = candidates(PANDA, T, q).arcs[0]
+        own = arcs[(arcs[:, 0] == form.branch_of(q)) & (arcs[:, 1] <= q[joint]) & (q[joint] <= arcs[:, 2])]
+        ends = [end_of_motion(PANDA.model, T, joint, sense, q, PANDA.lower, PANDA.upper) for sense in (-1.0, 1.0)]
+        assert own[0, 1:] == pytest.approx(ends, abs=1e-8)  # its ends have the slack of limits
 
 
 # -- answers ------------------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ import kin
 from app.viewer.lessons.inverse.sheet import StepKey
 from app.viewer.lessons.postures.planar import is_planar
 from kin import Robot
+from kin.angles import wrapped
 from kin.axes import inverse, is_zero
 from kin.solvers import closed_form_of
 from kin.solvers.contract import ClosedForm
@@ -82,7 +83,7 @@ class Arm:
     def joints(self, theta: Array) -> Array:
         """Joint values ``(n,)`` in (−π, π] of the angles of the formulas."""
         q = self.sense * (theta - self.offset)
-        return np.asarray(math.pi - (math.pi - q) % (2.0 * math.pi))
+        return np.asarray(wrapped(q))
 
     def rotation(self, theta: Array) -> Array:
         """R ``(3, 3)`` from the lesson's frame to the tool, by forward kinematics."""
@@ -152,9 +153,6 @@ def _placed(
         # A turn about the last axis is as well counted with the last joint.
         offset[-1] -= math.atan2(R[1, 0], R[0, 0])
         R = np.eye(3)
-    turn = offset % (2.0 * math.pi)
-    offset = np.where(
-        np.minimum(turn, 2.0 * math.pi - turn) < 1e-12, 0.0, math.pi - (math.pi - offset) % (2.0 * math.pi)
-    )
+    offset = np.where(np.abs(wrapped(offset)) < 1e-12, 0.0, wrapped(offset))
     lengths = {name: 0.0 if is_zero(length) else length for name, length in {**lengths, "d1": d1}.items()}
     return Arm(robot, family, frame, wrist, R, sense, offset, lengths, x, names)

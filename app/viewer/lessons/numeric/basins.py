@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.viewer.lessons.numeric.iteration import STILL, Problem, Settings, advance
 from kin import Robot, solve_ik
+from kin.angles import apart
 from kin.transforms import Array
 
 CELLS = 96  # along each side
@@ -61,16 +62,6 @@ def exact(problem: Problem) -> Array:
     return np.asarray(found[order])
 
 
-def off_by(q: Array, solutions: Array, revolute: NDArray[np.bool_]) -> Array:
-    """The largest difference of a joint ``(..., k)`` between configurations ``(..., n)`` and solutions ``(k, n)``.
-
-    Whole turns do not count.
-    """
-    difference = q[..., None, :] - solutions
-    wrapped = np.abs(np.remainder(difference + math.pi, 2.0 * math.pi) - math.pi)
-    return np.asarray(np.where(revolute, wrapped, np.abs(difference)).max(axis=-1))
-
-
 def turned_within(robot: Robot, q: Array) -> Array:
     """A configuration ``(n,)`` with each revolute joint turned by whole turns to the middle of its limits."""
     turn = 2.0 * math.pi
@@ -100,7 +91,7 @@ def search(problem: Problem, settings: Settings, cells: int = CELLS) -> Iterator
         for k in range(MOST + 1):
             done = np.linalg.norm(error, axis=1) < CLOSE
             if done.any() and len(solutions):
-                near = off_by(q[done], solutions, robot.revolute)
+                near = apart(q[done][:, None], solutions, robot.revolute)
                 which = np.argmin(near, axis=1)
                 reached[members[done]] = np.where(near.min(axis=1) < SAME, which + 1, 0)
             iterations[members[done]] = k

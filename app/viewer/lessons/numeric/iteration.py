@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from kin.axes import size
 from kin.fk import fk, jacobian
 from kin.robot import Robot
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array, rotation_vector
 
 Method = Literal["newton", "transpose", "damped", "gauss-newton"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -119,11 +119,8 @@ class Problem:
         missing = (self.T[:3, 3] - here[..., :3, 3]) / self.size
         if self.match == "point":
             return np.asarray(missing)
-        turn = wxyz_from_rotation(self.T[:3, :3] @ np.swapaxes(here[..., :3, :3], -1, -2))
-        sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
-        angle = 2.0 * np.arctan2(sine, turn[..., :1])
-        vector = turn[..., 1:] * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12)
-        return np.concatenate([missing, vector], axis=-1)
+        turn = rotation_vector(self.T[:3, :3] @ np.swapaxes(here[..., :3, :3], -1, -2))
+        return np.concatenate([missing, turn], axis=-1)
 
 
 class Moved(NamedTuple):

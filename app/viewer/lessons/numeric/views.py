@@ -11,10 +11,11 @@ from markupsafe import Markup
 
 from app.exports.curves import Curve, Row, with_legend
 from app.exports.svg import Axes, Plot, chart, png_url
-from app.viewer.lessons.numeric.basins import COLOURS, Basins, off_by, pixels, turned_within
+from app.viewer.lessons.numeric.basins import COLOURS, Basins, pixels, turned_within
 from app.viewer.lessons.numeric.iteration import MOST, Method, Problem, Run
 from app.viewer.views.templates import render
 from kin import Robot
+from kin.angles import apart
 from kin.transforms import Array
 from kin.units import Unit, Units, power
 
@@ -127,11 +128,11 @@ def _exact(problem: Problem, run: Run, solutions: Array | None, units: Units) ->
     many = f"{len(solutions)} solution{'s' * (len(solutions) > 1)} within the limits"
     if run.outcome != "reached":
         return f"Exact: {many}. kin finds them without a start."
-    near = off_by(run.q[-1], solutions, problem.robot.revolute)
+    near = apart(run.q[-1], solutions, problem.robot.revolute)
     best = int(np.argmin(near))
     if near[best] > 1e-4:
         return f"Exact: {many}; this is none of them."
-    start = int(np.argmin(off_by(run.q[0], solutions, problem.robot.revolute)))
+    start = int(np.argmin(apart(run.q[0], solutions, problem.robot.revolute)))
     words = f"Exact: {many}; this is number {best + 1}, with a difference of {power(float(near[best]))} rad."
     return words if start == best else f"{words} Number {start + 1} was nearer to the start."
 

@@ -7,7 +7,6 @@ mesh of directions in one batch.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -21,12 +20,12 @@ from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid
 from app.viewer.views.templates import render
 from kin import Robot
+from kin.angles import images_near
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 SUBDIVISIONS = 4
 COLOR = (0, 158, 115)
-_TURN = 2.0 * math.pi
 _FAR = 1e6  # stands in for a missing joint limit
 
 
@@ -66,8 +65,7 @@ def reachable(robot: Robot, point: Array) -> NDArray[np.bool_]:
     # Each angle, modulo 2π, nearest to the middle of its limits; NaN fails the comparison.
     lower, upper = np.maximum(robot.lower, -_FAR), np.minimum(robot.upper, _FAR)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-    off = q - middle
-    off -= _TURN * np.rint(off / _TURN)
+    off = images_near(q - middle)
     fits = np.asarray((np.abs(off) <= half + TOLERANCES.limit).all(axis=2))
     return np.asarray(fits.any(axis=1))
 

@@ -8,6 +8,7 @@ import kin
 from app.viewer.lessons.redundancy.ring import joint_axis
 from app.viewer.self_motion import INSET
 from kin import Robot
+from kin.angles import apart
 from kin.ik import Redundancy
 from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE
@@ -15,7 +16,6 @@ from kin.transforms import Array
 
 STEPS = 48  # samples of each range
 _ELBOW = 3  # joint 4
-_TURN = 2.0 * np.pi
 
 
 def has_path(robot: Robot, item: Redundancy) -> bool:
@@ -53,8 +53,8 @@ def _followed(rows: Array, start: int, q: Array) -> Array:
     for order in (range(start, len(rows)), range(start, -1, -1)):
         near = q
         for i in order:
-            apart = np.abs((rows[i] - near + np.pi) % _TURN - np.pi).max(axis=1)
-            if np.isnan(apart).all():
+            away = apart(rows[i], near)
+            if np.isnan(away).all():
                 break
-            near = out[i] = rows[i, int(np.nanargmin(apart))]
+            near = out[i] = rows[i, int(np.nanargmin(away))]
     return out

@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, excess, nearest_image
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, NEAR, TURN, excess, nearest_image
+from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.wrist5.point.constants import A1, A2, AMBIGUOUS, D4, D6, PHI, RAD, REACH, SLACK, H
 from kin.solvers.wrist5.point.newton import closes
 from kin.transforms import Array

@@ -7,7 +7,7 @@ from bisect import bisect_right
 
 import numpy as np
 
-from kin.solvers.common import TURN
+from kin.angles import TURN
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from kin.angles import TURN, excess
 from kin.kernels.compile import jit
-from kin.solvers.common import TURN, excess
 from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, JOINT, KAY, P0, PC, PR, PT, RAD, ZERO, H, M, S, X, Y
 from kin.transforms import Array
 

@@ -10,8 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from kin.angles import nearest_image
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, NEAR, nearest_image
+from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
 from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, INSET, JOINT, RAD, SHEET, START, ZERO, M
 from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from kin.solvers.common import HIGH, LOW, excess, nearest_image
+from kin.angles import excess, nearest_image
+from kin.solvers.common import HIGH, LOW
 from kin.solvers.contract import Candidates, Obstacle, RedundancyParameter, SolverInput
 from kin.solvers.wrist5.geometry import Geometry
 from kin.solvers.wrist5.point.constants import REACH

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from kin.angles import excess
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, excess
+from kin.solvers.common import HIGH, LOW
 from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, JOINT, KAY, P0, PC, PR, PT, RAD, ZERO, H, M, S
 from kin.solvers.wrist5.point.roots import quadratic, real_roots
 from kin.transforms import Array

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from kin.angles import TURN, nearest_image
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, TURN, nearest_image
+from kin.solvers.common import HIGH, LOW
 from kin.solvers.wrist5.point.configuration import branch_at, fits
 from kin.solvers.wrist5.point.constants import BRANCH, D6, END, JOINT, P0, PC, PR, PT, RAD, SHEET, START, ZERO, M
 from kin.solvers.wrist5.point.edges import level_roots, stretched

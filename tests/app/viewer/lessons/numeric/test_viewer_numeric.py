@@ -29,6 +29,7 @@ from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, encode
 from kin import Robot
+from kin.angles import apart
 from kin.transforms import Array
 from kin.units import Units
 
@@ -248,7 +249,7 @@ def test_the_basins_agree_with_single_runs(method: Method) -> None:
     for i, j in ((2, 6), (7, 3), (9, 9), (5, 5)):
         single = run(problem, settings, np.array([found.q1[j], found.q2[i]]), basins.MOST)
         if single.outcome == "reached":
-            near = basins.off_by(single.q[-1], found.solutions, PLANAR.revolute)
+            near = apart(single.q[-1], found.solutions, PLANAR.revolute)
             assert found.reached[i, j] == int(np.argmin(near)) + 1
             checked += 1
     assert checked or method == "transpose"

@@ -1,16 +1,16 @@
-"""The self-motion of a typed table with seven joints: a posture that meets the target, moved with the tool still.
+"""Points of a self-motion: a posture of seven joints that meets the target, moved with the tool still.
 
 The postures that meet one target are curves. At each of their points the Jacobian J ``(6, 7)`` has one null vector
 n, the direction of the curve. A point beside the curve with the error e moves onto it by the shortest x with
 ``J x = e``, and along it by any multiple of n. So one elimination answers every question asked here: the next
 iterate is ``y + x + s n``, with
 
-- s = 0 to land on the curve;
+- s = 0 to come onto the curve;
 - s = (v − y_c − x_c) / n_c to bring joint c to the value v;
 - s = (v − ψ) / ψ' to bring the arm angle to v;
 - s = −n_j / n_j' for a *fold*, where joint j turns back. n' follows from differentiating ``J n = 0``.
 
-All of these are Newton's method, so they converge quadratically (:func:`arrive`).
+All of these are Newton's method, so they converge quadratically (:func:`newton_to_event`).
 """
 
 from __future__ import annotations
@@ -20,20 +20,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.kernels.compile import jit
+from kin.kernels.dense import shortest_and_null
 from kin.kernels.jacobian import jacobian_into
 from kin.solvers.canonical import canonical_pose
-from kin.solvers.common import wrap
 from kin.solvers.numeric.error import relative_pose
 from kin.solvers.srs7.geometry import E1, E2, radial_of, triangle_of
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-# What `arrive` is asked for, if it is not the value of a joint (its index).
-FOLD, DIAL, LAND = -1, -2, -3
+# What `newton_to_event` is asked for, if it is not the value of a joint (its index).
+FOLD, VALUE, PROJECT = -1, -2, -3
 _STEPS = 24
 _LONGEST = 0.3  # rad of all joints together, in one step
 _CLOSE = 1e-7  # rad: the last step
 _MET_BY = 10.0  # times the last step, in m and rad: an error that this step can remove
+_SLACK = TOLERANCES.limit
 _NUDGE = 1e-5  # rad along the curve, for the rate of the arm angle
 
 
@@ -41,11 +44,11 @@ class Task(NamedTuple):
     """A target, and the redundancy parameter of the family.
 
     Attributes:
-        model: the typed table, as in `kin.kernels.fk`.
+        model: the arm, as in `kin.kernels.fk`.
         T: target ``(4, 4)``.
         joint: index of the joint whose value the parameter is, −1 if it is the arm angle ψ of an S-R-S arm.
-        frame: ``(22,)`` what `dial_of` needs for ψ: signs and offsets of canonical angles, lengths of upper arm
-            and forearm, e1 and e2 of the target.
+        frame: ``(22,)`` what `redundancy_value` needs for ψ: signs and offsets of canonical angles, lengths of
+            upper arm and forearm, e1 and e2 of the target.
 
     Kernels that are called from Python get it as arrays, see `task_of`.
     """
@@ -57,7 +60,7 @@ class Task(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A posture and what `look` finds there; all arrays are written to.
+    """A posture and what `linearize` finds there; all arrays are written to.
 
     Attributes:
         J, pose, axes: as in `jacobian_into`.
@@ -92,6 +95,14 @@ def task_of(model: Array, T: Array, setting: Array) -> Task:
 
 
 @jit
+def joint_task(model: Array, T: Array, joint: int) -> Task:
+    """The task of a target, with the value of a joint as the parameter."""
+    setting = np.zeros(SETTING)
+    setting[JOINT] = joint
+    return task_of(model, T, setting)
+
+
+@jit
 def new_point() -> Point:
     """Scratch for one posture."""
     return Point(
@@ -112,7 +123,7 @@ def set_frame(params: Array, T: Array, frame: Array) -> None:
 
 
 @jit
-def dial_of(task: Task, y: Array) -> float:
+def redundancy_value(task: Task, y: Array) -> float:
     """The redundancy parameter at a posture y ``(7,)``: as the family has it, but for the posture as it is."""
     if task.joint >= 0:
         return float(y[task.joint])
@@ -124,70 +135,18 @@ def dial_of(task: Task, y: Array) -> float:
 
 
 @jit
-def rate_of(task: Task, y: Array, n: Array) -> float:
+def _rate_of_value(task: Task, y: Array, n: Array) -> float:
     """The derivative of the redundancy parameter along n ``(7,)``."""
     if task.joint >= 0:
         return float(n[task.joint])
     there, back = np.empty(7), np.empty(7)
     for i in range(7):
         there[i], back[i] = y[i] + _NUDGE * n[i], y[i] - _NUDGE * n[i]
-    return wrap(dial_of(task, there) - dial_of(task, back)) / (2.0 * _NUDGE)
+    return wrap(redundancy_value(task, there) - redundancy_value(task, back)) / (2.0 * _NUDGE)
 
 
 @jit
-def _eliminate(J: Array, e: Array, A: Array, n: Array, x: Array) -> bool:
-    """n ``(7,)`` ← unit null vector of J, x ``(7,)`` ← the shortest vector with ``J x = e``; False if rank J < 6.
-
-    Gaussian elimination with the largest entry of each row as its pivot; A ``(7, 8)`` is scratch. The determinant
-    of J with n as a last row is positive, so that n changes along the curve without a jump.
-    """
-    sense = 1.0
-    for c in range(7):
-        A[6, c] = c  # which column of J this one is
-        for r in range(6):
-            A[r, c] = J[r, c]
-    for r in range(6):
-        A[r, 7] = e[r]
-    for k in range(6):
-        best, column = abs(A[k, k]), k
-        for c in range(k + 1, 7):
-            if abs(A[k, c]) > best:
-                best, column = abs(A[k, c]), c
-        if not best > 1e-14:
-            return False
-        if column != k:
-            sense = -sense
-            for r in range(7):
-                A[r, k], A[r, column] = A[r, column], A[r, k]
-        inverse = 1.0 / A[k, k]
-        sense = math.copysign(sense, sense * inverse)
-        for r in range(k + 1, 6):
-            factor = A[r, k] * inverse
-            for c in range(k + 1, 8):
-                A[r, c] -= factor * A[k, c]
-    free = int(A[6, 6])
-    n[free], x[free] = sense, 0.0
-    length, dot = 1.0, 0.0
-    for k in range(5, -1, -1):
-        along, step = -A[k, 6] * sense, A[k, 7]
-        for c in range(k + 1, 6):
-            i = int(A[6, c])
-            along -= A[k, c] * n[i]
-            step -= A[k, c] * x[i]
-        i, inverse = int(A[6, k]), 1.0 / A[k, k]
-        n[i], x[i] = along * inverse, step * inverse
-        length += n[i] * n[i]
-        dot += n[i] * x[i]
-    dot /= length
-    length = 1.0 / math.sqrt(length)
-    for i in range(7):
-        x[i] -= dot * n[i]
-        n[i] *= length
-    return True
-
-
-@jit
-def look(task: Task, y: Array, p: Point) -> float:
+def linearize(task: Task, y: Array, p: Point) -> float:
     """p ← what is found at y ``(7,)``; returns the largest entry of the error, infinity where J has no rank."""
     jacobian_into(task.model, y, p.J, p.pose, p.axes)
     relative_pose(p.pose, task.T, False, p.e)
@@ -195,12 +154,12 @@ def look(task: Task, y: Array, p: Point) -> float:
     for r in range(6):
         miss = max(miss, abs(p.e[r]))
         p.e[r] = -p.e[r]
-    return miss if _eliminate(p.J, p.e, p.A, p.n, p.x) else math.inf
+    return miss if shortest_and_null(p.J, p.e, p.A, p.n, p.x) else math.inf
 
 
 @jit
-def bend_of(p: Point) -> bool:
-    """p.bend ← the derivative of n along the curve, at the posture of the last `look`; False if there is none.
+def linearize_tangent(p: Point) -> bool:
+    """p.bend ← the derivative of n along the curve, where `linearize` was last; False if there is none.
 
     ``J n' = −J̇ n``: the acceleration of the tool at constant joint rates n. With ω the axis of a joint, v its
     column of the point's Jacobian and Ω the sum of n ω over the joints before it, that is the sum of
@@ -220,32 +179,32 @@ def bend_of(p: Point) -> bool:
         rest[4] -= n[i] * (Z * wx - X * wz)
         rest[5] -= n[i] * (X * wy - Y * wx)
         X, Y, Z = X + n[i] * wx, Y + n[i] * wy, Z + n[i] * wz
-    return _eliminate(J, rest, p.A, p.spare, p.bend)
+    return shortest_and_null(J, rest, p.A, p.spare, p.bend)
 
 
 @jit
-def arrive(task: Task, what: int, value: float, y: Array, p: Point) -> bool:
+def newton_to_event(task: Task, what: int, value: float, y: Array, p: Point) -> bool:
     """Move y ``(7,)``, in place, to where the curve has the value of a joint (`what` ≥ 0) or of the redundancy
-    parameter (DIAL), to a fold of the parameter's joint (FOLD), or just onto the curve (LAND).
+    parameter (VALUE), to a fold of the parameter's joint (FOLD), or just onto the curve (PROJECT).
 
-    p ← as by `look` at about y. False if Newton's method does not converge.
+    p ← as by `linearize` at about y. False if Newton's method does not converge.
     """
     met = False
     for _ in range(_STEPS):
-        miss = look(task, y, p)
+        miss = linearize(task, y, p)
         if not miss < 1.0:
             return False
         along, off = 0.0, 0.0
         if what >= 0:
             off = value - y[what]
             along = (off - p.x[what]) / p.n[what] if off != 0.0 or p.x[what] != 0.0 else 0.0
-        elif what == DIAL:
-            off = wrap(value - dial_of(task, y)) if task.joint < 0 else value - y[task.joint]
+        elif what == VALUE:
+            off = wrap(value - redundancy_value(task, y)) if task.joint < 0 else value - y[task.joint]
             step = off if task.joint < 0 else off - p.x[task.joint]
-            along = step / rate_of(task, y, p.n) if step != 0.0 else 0.0
+            along = step / _rate_of_value(task, y, p.n) if step != 0.0 else 0.0
         elif what == FOLD:
             off = p.n[task.joint]
-            if not bend_of(p):
+            if not linearize_tangent(p):
                 return False
             along = -off / p.bend[task.joint]
         size = 0.0
@@ -261,13 +220,13 @@ def arrive(task: Task, what: int, value: float, y: Array, p: Point) -> bool:
             break
     if met and what >= 0:
         y[what] = value
-    elif met and what == DIAL and task.joint >= 0:
+    elif met and what == VALUE and task.joint >= 0:
         y[task.joint] = value
     return met
 
 
 @jit
-def settle(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
+def correct(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
     """Move y ``(7,)``, in place, along the curve to a value of the redundancy parameter; whether that is possible.
 
     sense: sign of n_j where the posture is wanted: at a fold, two postures of different branches meet. 0.0 for
@@ -275,16 +234,16 @@ def settle(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
     """
     start, j = y.copy(), task.joint
     if j >= 0 and sense == 0.0:
-        if not look(task, y, p) < 1.0:
+        if not linearize(task, y, p) < 1.0:
             return False
         sense = p.n[j]
-    if arrive(task, DIAL, value, y, p) and (j < 0 or p.n[j] * sense > 0.0):
+    if newton_to_event(task, VALUE, value, y, p) and (j < 0 or p.n[j] * sense > 0.0):
         return True
     if j < 0:
         return False
     for i in range(7):
         y[i] = start[i]
-    if not (arrive(task, FOLD, 0.0, y, p) and bend_of(p)):
+    if not (newton_to_event(task, FOLD, 0.0, y, p) and linearize_tangent(p)):
         return False
     squared = 2.0 * (value - y[j]) / p.bend[j]
     if not 0.0 <= squared < _LONGEST * _LONGEST:
@@ -292,4 +251,22 @@ def settle(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
     s = math.copysign(math.sqrt(squared), sense * p.bend[j])
     for i in range(7):
         y[i] += s * (p.n[i] + 0.5 * s * p.bend[i])
-    return arrive(task, DIAL, value, y, p) and p.n[j] * sense > 0.0
+    return newton_to_event(task, VALUE, value, y, p) and p.n[j] * sense > 0.0
+
+
+@jit
+def slack_of(lower: Array, upper: Array, y: Array, c: int) -> float:
+    """How far joint c is inside its limits at its best whole turn; infinite where they leave a whole turn."""
+    half = 0.5 * (upper[c] - lower[c])
+    if half >= math.pi:
+        return math.inf
+    return float(half - abs(wrap(y[c] - 0.5 * (lower[c] + upper[c]))))
+
+
+@jit
+def is_inside(lower: Array, upper: Array, y: Array, but: int) -> bool:
+    """Whether all joints but one are inside their limits."""
+    inside = True
+    for c in range(7):
+        inside = inside and (c == but or slack_of(lower, upper, y, c) >= -_SLACK)
+    return inside

@@ -1,11 +1,10 @@
-"""The self-motion of a typed table followed step by step: its feasible intervals, whatever their structure.
+"""Self-motions followed step by step: their feasible intervals, whatever their structure, and their first ends.
 
-Used where the intervals of the arm that was meant may have another structure than those of the typed table. From a
-posture the curve is followed both ways, until a joint is outside its limits by more than a margin or the curve is
-closed: tangent steps, shortened where the curve bends, each followed by Newton's method. Between two points of the
-curve every joint is a cubic in the length. Its roots are where the joint meets a limit, and those of the
-derivative of the given joint are folds; Newton's method makes each such *event* exact. Between neighbouring events
-nothing changes, so one posture decides whether a piece is feasible.
+From a posture the curve is followed both ways, until a joint is outside its limits by more than a margin or the
+curve is closed: tangent steps, shortened where the curve bends, each followed by Newton's method. Between two
+points of the curve every joint is a cubic in the length. Its roots are where the joint meets a limit, and those of
+the derivative of the given joint are folds; Newton's method makes each such *event* exact. Between neighbouring
+events nothing changes, so one posture decides whether a piece is feasible.
 
 A step is halved where the cubics decide by their error only. Many starts are on the same few curves, so the points
 of a curve are kept: a start that is on one of them has nothing to add.
@@ -19,10 +18,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
-from kin.solvers.common import wrap
-from kin.solvers.rounded.ends import is_inside, slack_of
-from kin.solvers.rounded.motion import FOLD, LAND, Point, Task, arrive, dial_of, look, new_point, task_of
+from kin.solvers.selfmotion.points import (
+    FOLD,
+    PROJECT,
+    Point,
+    Task,
+    is_inside,
+    joint_task,
+    linearize,
+    new_point,
+    newton_to_event,
+    redundancy_value,
+    slack_of,
+    task_of,
+)
 from kin.transforms import Array
 
 PIECES = 128
@@ -31,7 +42,7 @@ _STEP, _FIRST, _LEAST = 0.15, 0.05, 1e-6  # rad of all joints together
 _STRAIGHT, _TURN = 0.995, 0.95  # cosines between tangents: of a step that may grow, and of one that is too long
 _POINTS = 6000  # of a curve, from its start to one side
 PATHS, CURVES = 16384, 64  # points and curves that are kept
-_LANDINGS, _NEAR = 12, 1e-6  # steps; rad: the last one, to go on from there
+_CORRECTIONS, _NEAR = 12, 1e-6  # steps; rad: the last one, to go on from there
 _MISSED = 1e-5  # m and rad: an error that such a step can remove
 _ERROR, _SPLITS = 0.02, 6  # of a cubic, times the fourth power of its length; how often a step is halved
 _BESIDE, _SAME = 1e-3, 1e-7  # rad from the cubics, and from the curve: a posture on it
@@ -69,10 +80,10 @@ def _least_slack(limits: tuple[Array, Array], y: Array) -> float:
 
 
 @jit
-def _land(task: Task, y: Array, p: Point) -> bool:
-    """As `arrive` onto the curve, within some 1e-10 rad only; p ← as by `look` within `_NEAR` of y."""
-    for _ in range(_LANDINGS):
-        miss = look(task, y, p)
+def _project(task: Task, y: Array, p: Point) -> bool:
+    """As `newton_to_event` onto the curve, within some 1e-10 rad only; p ← as by `linearize` near y."""
+    for _ in range(_CORRECTIONS):
+        miss = linearize(task, y, p)
         size = 0.0
         for i in range(7):
             size = max(size, abs(p.x[i]))
@@ -125,7 +136,7 @@ def _advance(task: Task, before: Curve, curve: Curve, h: float, sense: float, p:
         else:
             for i in range(7):
                 y1[i] = y0[i] + h * n0[i]
-        if _land(task, y1, p):
+        if _project(task, y1, p):
             dot, off = 0.0, 0.0
             for i in range(7):
                 n1[i] = sense * p.n[i]
@@ -232,8 +243,8 @@ def _events_between(task: Task, limits: tuple[Array, Array], curve: Curve, event
             count = _crossings(curve, c, centre - half, stops, n, events, count)
             count = _crossings(curve, c, centre + half, stops, n, events, count)
             if math.pi - half < _STEP:  # a step may pass both limits of a joint that lacks little of a whole turn
-                count = _crossings(curve, c, centre - 2.0 * math.pi + half, stops, n, events, count)
-                count = _crossings(curve, c, centre + 2.0 * math.pi - half, stops, n, events, count)
+                count = _crossings(curve, c, centre - TURN + half, stops, n, events, count)
+                count = _crossings(curve, c, centre + TURN - half, stops, n, events, count)
     return count
 
 
@@ -301,6 +312,53 @@ def _walk(
 
 
 @jit
+def end_of_motion(model: Array, T: Array, joint: int, sense: float, q: Array, lower: Array, upper: Array) -> float:
+    """The value of a joint up to which the self-motion from q ``(7,)`` stays inside the limits, one turn at most.
+
+    There the joint turns back, or a joint meets a limit, or the curve is lost.
+
+    Args:
+        sense: 1.0 upwards, −1.0 downwards.
+    """
+    start = float(q[joint])
+    end = _first_end(joint_task(model, T, joint), (lower, upper), sense, q)
+    ahead = min(max(sense * (end - start), 0.0), TURN)
+    return float(min(max(start + sense * ahead, lower[joint]), upper[joint]))
+
+
+@jit
+def _first_end(task: Task, limits: tuple[Array, Array], sense: float, q: Array) -> float:
+    """As `end_of_motion`, but for rounding errors."""
+    p, y, events, at = new_point(), q.copy(), np.empty((_EVENTS, 3)), np.empty(7)
+    if not newton_to_event(task, PROJECT, 0.0, y, p):
+        return float(q[task.joint])
+    along = math.copysign(1.0, sense * p.n[task.joint])
+    curve = (y, along * p.n, np.empty(7), np.empty(7))
+    before = (y.copy(), along * p.n, curve[0], curve[1])
+    h = _FIRST
+    for _ in range(_POINTS):
+        h = _advance(task, before, curve, h, along, p)
+        for _ in range(_SPLITS):
+            if h > 0.0 and _is_close_call(task, limits, curve):
+                h = _advance(task, before, curve, 0.5 * _length(curve), along, p)
+        if h == 0.0 or abs(curve[0][task.joint] - q[task.joint]) > TURN:
+            break
+        n, s = _events_between(task, limits, curve, events), 0.0
+        for i in range(n + 1):
+            following = events[i, 0] if i < n else 1.0
+            _at(curve, 0.5 * (s + following), at)
+            if (i > 0 and events[i - 1, 1] == FOLD) or not is_inside(limits[0], limits[1], at, -1):
+                _at(curve, s, at)
+                met = i > 0 and newton_to_event(task, int(events[i - 1, 1]), events[i - 1, 2], at, p)
+                return float(at[task.joint] if met else curve[0][task.joint])
+            s = following
+        for i in range(7):
+            before[0][i], before[1][i] = curve[0][i], curve[1][i]
+            curve[0][i], curve[1][i] = curve[2][i], curve[3][i]
+    return float(curve[0][task.joint])
+
+
+@jit
 def _load(path: Array, k: int, curve: Curve) -> None:
     """The points k and k + 1 of a path as a curve."""
     for i in range(7):
@@ -338,7 +396,7 @@ def _is_on(task: Task, path: Array, y: Array) -> bool:
         if not off < _BESIDE:
             continue
         for _ in range(3):
-            if not _land(task, u, p):
+            if not _project(task, u, p):
                 break
             ahead = off = 0.0
             for i in range(7):
@@ -385,7 +443,7 @@ def _trace(
 ) -> int:
     """As `trace` for one posture ``(7,)``; −1 if its curve is lost."""
     y, p = start.copy(), new_point()
-    if not arrive(task, LAND, 0.0, y, p):
+    if not newton_to_event(task, PROJECT, 0.0, y, p):
         return -1
     if _least_slack(limits, y) < -margin:
         return 0
@@ -430,14 +488,14 @@ def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, 
     curve = (np.empty(7), np.empty(7), np.empty(7), np.empty(7))
     _load(path, 0, curve)
     best, piece = curve[0].copy(), curve[0].copy()
-    value = dial_of(task, piece)
+    value = redundancy_value(task, piece)
     first, score = value, -math.inf
     begun, around, found, k = not closed, False, 0, 0
     ahead, left = np.empty((_SPLITS, 14)), 0
     while True:
         if left == 0 and k == path.shape[0] - 1:
             if not begun and is_inside(limits[0], limits[1], best, -1):
-                return _put(task, (value - 2.0 * math.pi, value), (best, best, best), arcs, places, found)
+                return _put(task, (value - TURN, value), (best, best, best), arcs, places, found)
             if around or not (closed and begun):
                 return found
             around, k = True, 0  # a closed curve: on to its first event
@@ -451,7 +509,7 @@ def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, 
                 curve[2][i], curve[3][i] = ahead[left, i], ahead[left, 7 + i]
         while left < _SPLITS and _is_close_call(task, limits, curve):
             _at(curve, 0.5, at)
-            if not _land(task, at, p):
+            if not _project(task, at, p):
                 return -1
             for i in range(7):
                 ahead[left, i], ahead[left, 7 + i] = curve[2][i], curve[3][i]
@@ -465,9 +523,9 @@ def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, 
             done = events[i, 0]
             score = _clearer(limits, at, _rate(task, curve, middle), score, best)
             _at(curve, done, at)
-            if not arrive(task, int(events[i, 1]), events[i, 2], at, p):
+            if not newton_to_event(task, int(events[i, 1]), events[i, 2], at, p):
                 return -1
-            there = value + wrap(dial_of(task, at) - value)
+            there = value + wrap(redundancy_value(task, at) - value)
             if begun and abs(there - first) > _EMPTY and is_inside(limits[0], limits[1], best, -1):
                 found = _put(task, (first, there), (piece, at, best), arcs, places, found)
                 if found < 0:
@@ -476,7 +534,7 @@ def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, 
                 return found
             begun, value, first, score = True, there, there, -math.inf
             _copy(at, piece)
-        value += wrap(dial_of(task, curve[2]) - value)
+        value += wrap(redundancy_value(task, curve[2]) - value)
         score = _clearer(limits, curve[2], _rate(task, curve, 1.0), score, best)
 
 
@@ -489,12 +547,12 @@ def _put(
     if found == arcs.shape[0]:
         return -1
     inner, p = postures[2].copy(), new_point()
-    if not arrive(task, LAND, 0.0, inner, p):
+    if not newton_to_event(task, PROJECT, 0.0, inner, p):
         return -1
     back = 0 if ends[0] <= ends[1] else 1
     arcs[found, back], arcs[found, 1 - back] = ends
     _copy(postures[0], places[found, back])
     _copy(postures[1], places[found, 1 - back])
     _copy(inner, places[found, 2])
-    arcs[found, 2] = dial_of(task, inner)
+    arcs[found, 2] = redundancy_value(task, inner)
     return found + 1
