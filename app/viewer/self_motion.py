@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import kin
+from app.viewer.null_space import null_space
 from kin import IKOptions, IKResult, Robot
-from kin.differential.null_space import null_space
 from kin.differential.task import free_motions
 from kin.ik import Redundancy, Task, solve
 from kin.ik.problem import prepare

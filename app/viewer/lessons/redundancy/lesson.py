@@ -27,11 +27,11 @@ from app.viewer.lessons.redundancy.facts import RedundancyFacts
 from app.viewer.lessons.redundancy.questions import outline
 from app.viewer.lessons.redundancy.ring import Ring
 from app.viewer.lessons.redundancy.settings import MOVING, RedundancySettings
+from app.viewer.null_space import lead, within
 from app.viewer.panel.posture import on_side_of
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import INSET, SMOOTH, circular, ends, range_of, self_motion
 from kin import IKResult
-from kin.differential.null_space import lead, within
 from kin.ik import Redundancy
 from kin.transforms import Array
 from kin.warmup import ALL

@@ -13,9 +13,9 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import line
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.null_space import lead
 from kin import Robot, fk, jacobian
 from kin.axes import NEARLY
-from kin.differential.null_space import lead
 from kin.differential.task import free_motions, rank
 from kin.transforms import Array
 from kin.units import Units, fixed

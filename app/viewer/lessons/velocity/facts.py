@@ -23,9 +23,9 @@ from app.viewer.lessons.velocity.ellipsoids import (
 )
 from app.viewer.lessons.velocity.settings import SPEEDS, VelocitySettings
 from app.viewer.lessons.velocity.views import SAMPLE, State, lost_words, nice, real, state_of
+from app.viewer.null_space import NullSpace, margin, measure, null_space, secondary
 from app.viewer.scene.meshes import body
 from kin import Robot
-from kin.differential.null_space import NullSpace, margin, measure, null_space, secondary
 from kin.ik import Singularity, Task
 from kin.transforms import Array
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from app.viewer.lessons.velocity.facts import VelocityFacts
 from app.viewer.lessons.velocity.settings import SPEEDS
+from app.viewer.null_space import hold
 from app.viewer.panel.status import Notice
-from kin.differential.null_space import hold
 from kin.transforms import Array
 
 FRAME = 1 / 30  # s

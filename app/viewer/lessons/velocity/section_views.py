@@ -8,10 +8,10 @@ from app.exports.curves import Curve, Row, with_legend
 from app.viewer.arm import Arm
 from app.viewer.lessons.velocity.along import SAME, SHARE, Along, along, ends
 from app.viewer.lessons.velocity.views import axis_name
+from app.viewer.null_space import NullSpace
 from app.viewer.panel.joints import label
 from app.viewer.views.templates import render
 from kin import Robot, fk
-from kin.differential.null_space import NullSpace
 from kin.ik import Task
 from kin.transforms import Array
 from kin.units import Units, fixed, general, power

@@ -10,7 +10,7 @@ import numpy as np
 from app.viewer.declared.fields import Number, Settings, choice, flag, joint, memory, number, part, vector
 from app.viewer.lessons.velocity.ellipsoids import Ellipsoid
 from app.viewer.lessons.velocity.jog import Frame
-from kin.differential.null_space import Goal
+from app.viewer.null_space import Goal
 from kin.transforms import Array
 
 FRAMES: dict[str, Frame] = {"Base": "base", "Tool": "tool"}

@@ -20,10 +20,10 @@ from app.viewer.lessons.velocity.along import SAMPLES, along, controllable
 from app.viewer.lessons.velocity.ellipsoids import axes_of
 from app.viewer.lessons.velocity.facts import torques
 from app.viewer.lessons.velocity.settings import GOALS
+from app.viewer.null_space import margin, measure, null_space, secondary
 from app.viewer.panel.joints import label
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
-from kin.differential.null_space import margin, measure, null_space, secondary
 from kin.differential.task import task_rows, usual_rank
 from kin.transforms import Array
 from kin.units import Units

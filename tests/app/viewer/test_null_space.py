@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import kin
+from app.viewer.null_space import error, hold, lead, margin, measure, null_space, secondary
 from app.viewer.self_motion import leaders
 from kin import Robot
-from kin.differential.null_space import error, hold, lead, margin, measure, null_space, secondary
 from kin.differential.task import free_motions, task_rows
 from kin.ik import Task
 from kin.transforms import rotation_angle, vector_angle
