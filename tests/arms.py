@@ -18,7 +18,7 @@ from kin.ik.problem import IKProblem
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 # Expensive tests run over these, cheap ones over the whole library. Older trees, which the differential test asks
 # about these arms, have no others.
-CLASSICS = tuple(getattr(kin, "classic_robots", kin.builtin_robots)().values())
+CLASSICS = tuple(getattr(kin.files, "classic_robots", kin.builtin_robots)().values())
 CHAPTER_ARMS = ("pioneer5", "redundant7", "redundant7-craig")
 
 
