@@ -54,6 +54,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
             those before it.
         read: the facts that the panel shows. Drawings that change no faster than the panel use these.
         shown_at: when the panel was last made to show them (`time.perf_counter`).
+
+    Args:
+        within: the feature that this one is a part of, which gets its events under its key and calls its methods.
     """
 
     settings_of: ClassVar[type[Settings]]
@@ -66,8 +69,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if cls.messages & OWN:
             raise TypeError(f"{cls.__name__}.messages must not contain {', '.join(sorted(cls.messages & OWN))}")
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: Stage, within: Feature | None = None) -> None:
         super().__init__(stage)
+        self._within = within
         self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
         self._panel = PanelView(stage.client.gui, self.post, stage.fence)
         self._scene = SceneView(stage.client.scene, self.key, self.post)
@@ -224,6 +228,12 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     # Feature
 
+    def post(self, key: Hashable, value: object = None) -> None:
+        if self._within is None:
+            super().post(key, value)
+        else:
+            self._within.post((self.key, key), value)
+
     def handle(self, key: Hashable, value: object) -> None:
         self.invalidate()
         self.schedule()  # shown once, after all events that wait, and after errors
@@ -286,11 +296,13 @@ class DeclaredFeature(Feature, Generic[S, F]):
         try:
             again = self._go_on(now)
         finally:
+            if news := self._stale:
+                self.refresh()
             self.invalidate()
             self._draw()
             changed = self.facts is not self.read
             wait = max(0.0, self._interval - (now - self.shown_at)) if changed else None
-            waits = again, 0.0 if self._stale else wait
+            waits = again, 0.0 if news else wait
             self.due = min((one for one in waits if one is not None), default=None)
 
     def state(self) -> dict[str, object]:

@@ -67,7 +67,7 @@ class RobotTab(Feature):
         self._converting = False
         gui = stage.client.gui
         self._html = {name: add_html(gui) for name in PARTS}
-        self._comparing = Comparing(stage, self._post_comparing)
+        self._comparing = Comparing(stage, self)
         self._html |= {name: add_html(gui) for name in ("files", "doctor")}
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._beginnings.start,
@@ -114,7 +114,7 @@ class RobotTab(Feature):
             case ("arriving", "other-text") if isinstance(value, IncomingFile):
                 if value.failure:
                     self._refuse(*value.notice)
-            case ("comparing", inner):
+            case ("compare", inner):
                 self._comparing.handle(inner, value)
                 self._plan()
             case (str(name),) if name in self._handlers:
@@ -122,9 +122,6 @@ class RobotTab(Feature):
                 self._plan()
             case _:
                 raise InputError("robot", key, "the key of a field or a button")
-
-    def _post_comparing(self, key: Hashable, value: object = None) -> None:
-        self.post(("comparing", key), value)
 
     def tick(self, now: float) -> None:
         self._comparing.tick(now)

@@ -34,8 +34,6 @@ class Axes:
 
     Attributes:
         corners: the ends of the axes and the places of their titles ``(n, 3)``; None: no axes are shown.
-
-    Args:
     """
 
     def __init__(self, scene: viser.SceneApi) -> None:

@@ -60,8 +60,6 @@ class PointPicker:
     """Finds the clicked point and moves the arm to its configuration.
 
     Posts ``"click"`` and ``"picked"`` to itself; `post` returns them.
-
-    Args:
     """
 
     def __init__(self, stage: Stage, said: Said, post: Post) -> None:

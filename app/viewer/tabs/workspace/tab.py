@@ -62,7 +62,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene)
         self._moved = 0.0  # when the arm did last
-        self._capability = Capability(stage, window, self._post_capability, self._open_map)
+        self._capability = Capability(stage, self, window, self._open_map)
         self._capability.use_look(self.settings.map, None, None)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
@@ -239,9 +239,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._capability.clear()
         self._axes.remove()
         self._show_section(False)
-
-    def _post_capability(self, key: Hashable, value: object = None) -> None:
-        self.post(("capability", key), value)
 
     # Settings
 

@@ -6,7 +6,7 @@ comparison, and what is under way for the old one ends.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast, get_args
 
@@ -17,10 +17,8 @@ from app.viewer.declared.panel import Control, Html
 from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Node
 from app.viewer.declared.work import Result, Work
-from app.viewer.feature import Stage
 from app.viewer.meshes.incoming import IncomingFile
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits
 from app.viewer.tabs.robot.compare import reference, views
@@ -80,22 +78,11 @@ class CompareFacts(Facts[CompareSettings]):
 
 
 class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
-    """The comparison of one page. Builds its elements in whatever container is open.
-
-    Args:
-        post: returns the events of its controls to `handle`.
-    """
+    """The comparison of one page. Builds its elements in whatever container is open."""
 
     key = "compare"
     title = "Compare with"
     settings_of, facts_of = CompareSettings, CompareFacts
-
-    def __init__(self, stage: Stage, post: Post) -> None:
-        self._to = post
-        super().__init__(stage)
-
-    def post(self, key: Hashable, value: object = None) -> None:
-        self._to(key, value)
 
     # What is chosen
 

@@ -6,7 +6,7 @@ folder polls it a few times a second and redraws it if it has changed. The visit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node, Progress, same
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Result, Work
-from app.viewer.feature import Stage
-from app.viewer.panel import Post
+from app.viewer.feature import Feature, Stage
 from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.capability import views
 from app.viewer.tabs.workspace.capability.settings import Look, MapSettings
@@ -79,7 +78,6 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
 
     Args:
         window: flow control, shared with the clouds.
-        post: returns the events of controls and clicks to `handle`.
         appears: called with the first voxels of a map that the visitor has started, before they are drawn.
     """
 
@@ -88,19 +86,12 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     settings_of, facts_of = MapSettings, MapFacts
 
     def __init__(
-        self,
-        stage: Stage,
-        window: SendWindow,
-        post: Post,
-        appears: Callable[[CapabilityMap], None],
+        self, stage: Stage, tab: Feature, window: SendWindow, appears: Callable[[CapabilityMap], None]
     ) -> None:
-        self._window, self._to, self._appears = window, post, appears
+        self._window, self._appears = window, appears
         self._voxels: Voxels | None = None
         self._painted = 0.0
-        super().__init__(stage)
-
-    def post(self, key: Hashable, value: object = None) -> None:
-        self._to(key, value)
+        super().__init__(stage, tab)
 
     def panel(self) -> Sequence[Node]:
         f, found, s, units = self.read, self.read.found, self.settings, self.stage.units
