@@ -6,8 +6,8 @@ kind of answer it is. There always is one: its `status` and `cause` are codes, i
 `reason` is a sentence (:mod:`kin.ik.messages`).
 
 A closed form gives all branches. Where the task leaves a redundancy parameter (arm angle, θ1, roll), each branch
-has the feasible value nearest to the seed, from feasible arcs (exact but for offset7 and general7), so that a pose
-that can be reached inside the limits is found. Numeric descents (:mod:`kin.solvers.numeric`) find the closest
+has the value at which it is nearest to the seed, in feasible arcs (exact but for offset7 and general7), so that a
+pose that can be reached inside the limits is found. Numeric descents (:mod:`kin.solvers.numeric`) find the closest
 configuration to a target that cannot be reached, and solve tasks and arms without a closed form.
 """
 

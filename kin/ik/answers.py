@@ -21,6 +21,7 @@ from kin.ik.results import IKResult, Status
 from kin.solvers.contract import APPROACH, POSE, POSITION, Candidates
 from kin.transforms import Array
 
+_OTHERS = 8  # further starts of descents where the nearest of many configurations is wanted
 _SUSPICIOUS = 1e3  # times the rounding: where the formulas of a rounded table may miss postures
 
 
@@ -162,18 +163,25 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
     Where the arm has a closed form for whole poses, it adds the other branches of the poses found.
     """
     prefer = problem.options.prefer
-    avoids = problem.options.avoids
+    avoids, moves = problem.options.avoids, leaves_motion(problem)
     if problem.branches is None and prefer == "nearest" and not avoids:
         pool = nearest.solve_numerically(problem).q[None]
+        if moves:
+            others = nearest.descend_each(
+                problem, problem.code, nearest.starting_points(problem, count=_OTHERS), 1.0
+            )
+            pool = np.concatenate([pool, others[0]])
     else:
         starts = nearest.starting_points(problem, count=4 * nearest.STARTS)
         pool = nearest.descend_each(problem, problem.code, starts, 1.0)[0]
     q, stats = _usable(problem, *measure(problem, pool))
     if not len(q):
         return None
-    related = [_same_pose(problem, row) for row in q]
+    related = [_same_pose(problem, row) for row in (q[:1] if moves and prefer == "nearest" else q)]
     q = np.concatenate([q, *related])
     if prefer == "nearest":
+        if moves:  # some leave their branch
+            q = np.concatenate([q, nearest.moved_nearer(problem, q)])
         q, stats = measure(problem, q)
         key = stats[:, DISTANCE].copy()
     else:
@@ -197,12 +205,14 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
         closest = nearest.closest(problem, None)
         return make_result(problem, Status.UNREACHABLE, "branch", details, closest=closest)
     form = problem.closed_form if len(related[0]) else None
-    return _descended(problem, q, stats, best, "numeric" if form is None else form.name)
+    return _descended(problem, q, stats, best, moves, "numeric" if form is None else form.name)
 
 
-def _descended(problem: IKProblem, q: Array, stats: Array, best: dict[int, int], solver: str) -> IKResult:
-    """The answer with the best rows of q ``(k, n)`` that descents found, by branch."""
-    rows, moves = list(best.values()), leaves_motion(problem)
+def _descended(
+    problem: IKProblem, q: Array, stats: Array, best: dict[int, int], moves: bool, solver: str
+) -> IKResult:
+    """The answer with the best rows of q ``(k, n)`` that descents found, by branch; moves: as `leaves_motion`."""
+    rows = list(best.values())
     curves, kept = ((), rows) if moves else curves_of(problem, q, rows)
     solutions = tuple(solution(problem, q[i], stats[i], branch) for branch, i in best.items() if i in kept)
     if problem.options.images == "all":

@@ -24,6 +24,7 @@ from kin.ik.results import IKSolution
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
 from kin.solvers.numeric import each_of, solve, spread
 from kin.solvers.numeric.error import Goal
+from kin.solvers.numeric.nearby import move_nearer
 from kin.solvers.numeric.step import Bounds
 from kin.solvers.numeric.valley import follow
 from kin.tolerances import TOLERANCES
@@ -125,6 +126,20 @@ def _followed(problem: IKProblem, search: _Search, q: Array, errors: Array) -> A
 def at_floor(problem: IKProblem, q: Array, weight: float) -> tuple[Array, float]:
     """The closest configuration along the weakly controllable directions from q ``(n,)``, and its error E."""
     return follow(problem.robot.model, *_search(problem, problem.code, weight), q)
+
+
+def moved_nearer(problem: IKProblem, q: Array) -> Array:
+    """Configurations ``(k, n)`` that meet a task which leaves a motion, moved towards the seed.
+
+    Each ends where no configuration around it is nearer; what does not meet the task stays.
+    """
+    goal, _, _ = _search(problem, problem.code, 1.0)
+    low, high = (problem.lower, problem.upper) if problem.respect else (problem.low, problem.high)
+    scale, found = problem.requirement.weights**-2.0, np.clip(q, low, high)
+    for there, row in zip(found, q, strict=True):
+        if not move_nearer(problem.robot.model, goal, low, high, problem.seed, scale, there):
+            there[:] = row
+    return found
 
 
 def _beside(problem: IKProblem) -> float:
