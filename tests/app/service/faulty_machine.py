@@ -210,12 +210,12 @@ class Machine:
             self.cookie = f"{COOKIE}={student.cookies[COOKIE]}"
 
     def student(self) -> FakeBrowser:
-        """A page of the student, at an exercise. It is tried again while kernels are compiled."""
+        """A page of the student, at an exercise; tried again while the viewer starts or kernels are compiled."""
         end = time.monotonic() + PATIENCE
         while True:
             try:
                 return self._student()
-            except AssertionError:
+            except (AssertionError, WebSocketException):
                 if time.monotonic() > end:
                     raise
 
