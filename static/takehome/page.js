@@ -2,7 +2,7 @@
 // A saved page of one arm: its sliders, its target, its postures and its program, without a server. What it shows is in
 // the element #data, which app/viewer/takehome wrote; lengths there are metres and angles radians, whatever is on screen.
 // An arm whose kernels can be generated solves for its target here (solver.js); another one shows what was saved.
-(() => {
+(async () => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const { robot } = data;
   const find = (selector) => document.querySelector(selector);
@@ -70,14 +70,25 @@
     return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
   }
 
+  // Rows of three whole numbers, of which the file has the differences, deflated.
+  async function unpacked(text, Kind) {
+    const packed = new Blob([bytes(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const found = new Kind(await new Response(packed).arrayBuffer());
+    for (let i = 3; i < found.length; i++) found[i] += found[i - 3];
+    return found;
+  }
+
+  await Promise.all(data.parts.map(async (part) => {
+    part.vertices = await unpacked(part.vertices, Uint16Array);
+    part.faces = await unpacked(part.faces, part.wide ? Uint32Array : Uint16Array);
+  }));
+
   function geometry(part) {
-    const steps = new Uint16Array(bytes(part.vertices));
-    const points = new Float32Array(steps.length);
-    for (let i = 0; i < steps.length; i++) points[i] = part.low[i % 3] + steps[i] * part.step[i % 3];
+    const points = new Float32Array(part.vertices.length);
+    for (let i = 0; i < points.length; i++) points[i] = part.low[i % 3] + part.vertices[i] * part.step[i % 3];
     const made = new THREE.BufferGeometry();
     made.setAttribute("position", new THREE.BufferAttribute(points, 3));
-    const faces = bytes(part.faces);
-    made.setIndex(new THREE.BufferAttribute(part.wide ? new Uint32Array(faces) : new Uint16Array(faces), 1));
+    made.setIndex(new THREE.BufferAttribute(part.faces, 1));
     made.computeVertexNormals();
     return made;
   }

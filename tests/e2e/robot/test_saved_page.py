@@ -82,6 +82,7 @@ def saved(browser: Browser, file: Path) -> Iterator[Page]:
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: said.append(request.url))
     page.goto(file.as_uri())
+    expect(page.locator("#pose dd")).to_have_count(6)  # its meshes are unpacked
     yield page
     page.close()
     # Chromium without a graphics card says that it draws in software.
