@@ -232,7 +232,7 @@ def test_the_arm_is_drawn_and_can_be_turned_with_the_keyboard(saved: Page) -> No
 def test_a_phone_shows_everything_without_scrolling_sideways(saved: Page, width: int) -> None:
     saved.set_viewport_size({"width": width, "height": 844})
     assert saved.evaluate("document.documentElement.scrollWidth") <= width
-    for row in saved.locator(".joint").all():
+    for row in saved.locator("#joints .joint, #aim .aim, #postures li").all():
         box = row.bounding_box()
         assert box is not None
         assert box["x"] >= 0
