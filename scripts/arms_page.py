@@ -23,7 +23,8 @@ of a library. A maker's arm is in it only if its forward kinematics agrees with 
 The field *Find an arm* in the tab *Robot*, `kinboard robots --find "kuka joints:7"` and `GET
 /api/v1/robots?find=…` search by id, name, maker, number of joints (`joints:6`, `joints:4..6`), reach in metres
 (`reach:0.5..1.2`) and solver (`solver:wrist6`). The reach is an upper bound, from the base to the tool point.
-The solvers have [pages of their own](background/inverse-kinematics.md).
+The solvers have [pages of their own](background/inverse-kinematics.md). On the site of this documentation, each
+picture leads to the arm: a [page that solves by itself](embedding.md#as-a-file).
 
 This page is written by `scripts/arms_page.py`.
 """

@@ -1,13 +1,13 @@
 """Hook of MkDocs: arms in the pages of docs/ that readers can move.
 
-``<!-- figure: ur5 -->`` in a page becomes a frame with a row of `FIGURES`, which `kin.save_page` writes for the
-site. In a checkout the comment stays invisible.
+Each built-in arm has a page, as `kin.save_page` writes it, but with the scripts that all share in files of their
+own. The pictures of the page *Arms* lead to it, and ``<!-- figure: ur5 -->`` in a page becomes a frame with a row
+of `FIGURES`. In a checkout the comment stays invisible.
 """
 
 from __future__ import annotations
 
 import re
-import tempfile
 from html import escape
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,8 +16,11 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 import kin
+from app.viewer.scene.bodies.drawing import drawing
+from app.viewer.takehome.page import SavedArm, shared_files, web_page
 
 ROOT = Path(__file__).parents[1]
+PICTURE = re.compile(r"!\[[^\]]*\]\(images/arms/([\w-]+)\.webp\)")
 COMMENT = re.compile(r"^<!-- figure: ([\w-]+) -->$", re.MULTILINE)
 
 
@@ -51,23 +54,26 @@ FIGURES = {
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages of all figures to the site."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name, figure in FIGURES.items():
-            robot = kin.get_robot(name)
-            target = kin.fk(robot, robot.q_home) if figure.postures else None
-            motion = None
-            if figure.program:
-                program = kin.motion.parse_program((ROOT / figure.program).read_text(encoding="utf-8"), robot)
-                motion = kin.plan_motion(robot, program)
-            path = kin.save_page(robot, Path(folder) / "page.html", target=target, motion=motion)
-            files.append(File.generated(config, address(name), content=path.read_text(encoding="utf-8")))
+    """Add the pages of all arms to the site."""
+    for name, text in shared_files().items():
+        files.append(File.generated(config, f"figures/{name}", content=text))
+    for robot in kin.builtin_robots().values():
+        figure = FIGURES.get(robot.id, Figure(""))
+        target = kin.fk(robot, robot.q_home) if figure.postures else None
+        motion = None
+        if figure.program:
+            program = kin.motion.parse_program((ROOT / figure.program).read_text(encoding="utf-8"), robot)
+            motion = kin.plan_motion(robot, program)
+        saved = SavedArm(robot, robot.q_home, drawing(robot), target, motion=motion)
+        files.append(File.generated(config, address(robot.id), content=web_page(saved, shared=True)))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Put a frame in the place of each comment."""
+    """Put a frame in the place of each comment, and an arm's page behind its picture."""
     up = "../" * page.url.strip("/").count("/") + ("../" if page.url.strip("/") else "")
+    if page.file.src_uri == "arms.md":
+        markdown = PICTURE.sub(lambda found: f"[{found[0]}<br>Try it]({address(found[1])})", markdown)
     return COMMENT.sub(lambda found: frame(found[1], up), markdown)
 
 

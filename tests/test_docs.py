@@ -348,6 +348,16 @@ def test_the_site_has_its_figures(site):
 
 
 @pytest.mark.full
+def test_each_arm_has_a_page_behind_its_picture_and_the_site_stays_small(site):
+    arms = (site / "arms" / "index.html").read_text(encoding="utf-8")
+    for name in kin.builtin_robots():
+        assert f'href="../{figures.address(name)}"' in arms
+        page = (site / figures.address(name)).read_text(encoding="utf-8")
+        assert all((site / "figures" / each).is_file() for each in loaded(page) if each != "data:,")
+    assert sum(file.stat().st_size for file in site.rglob("*") if file.is_file()) < 15_000_000
+
+
+@pytest.mark.full
 def test_the_site_loads_nothing_from_the_internet(site):
     pages = list(site.rglob("*.html"))
     assert len(pages) > len(PAGES) - 1
@@ -362,6 +372,7 @@ def test_a_resource_from_the_internet_would_be_found():
     assert loaded('<link rel="stylesheet" href="https://fonts.example/a.css">') == ["https://fonts.example/a.css"]
 
 
+@pytest.mark.full
 def test_the_site_has_a_page_per_solver_and_every_public_function(site):
     for robot in kin.builtin_robots().values():
         solver = kin.solve_ik(robot, kin.fk(robot, robot.q_home), max_solutions=1).solver
