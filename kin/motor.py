@@ -2,7 +2,7 @@
 
 A motor counts in a unit of its own, from a zero of its own, and perhaps backwards: its reading is
 ``offset + sign · q`` with the joint value q in that unit. Between a model and a real arm, a wrong sign or zero is
-what is wrong most often; `kin.readings` converts between readings and joint values, and finds sign and zero from a
+what is wrong most often; `kin.motors` converts between readings and joint values, and finds sign and zero from a
 few poses.
 """
 

@@ -94,8 +94,8 @@ class Robot:
         floor: height (m) of the floor in the world frame, None if it is not stated.
         motors: what the motors of the joints read, none if that is not stated. One whose joint is no moving row
             moves nothing: an arm that is made from another may keep its motors.
-        pendant: what a pendant shows of joints otherwise than their values, see `kin.to_pendant`. An entry that
-            names no joint counts for nothing, for the same reason.
+        pendant: what a pendant shows of joints otherwise than their values, see `kin.motors.to_pendant`. An entry
+            that names no joint counts for nothing, for the same reason.
         ros_joints: by the names of joints, what the published description for ROS calls them; the others have the
             same name there.
 
@@ -467,7 +467,7 @@ class Robot:
                 raise InputError(field, error.value.strip("'"), f"{self.n} joint values in {unit}") from None
             raise
 
-    def in_limits(self, q: Array, slack: float = 0.0) -> NDArray[np.bool_]:
+    def in_limits(self, q: ArrayLike, slack: float = 0.0) -> NDArray[np.bool_]:
         """Whether configurations respect the joint limits.
 
         Args:
@@ -477,14 +477,18 @@ class Robot:
         Returns:
             ``(...)`` booleans.
 
+        Raises:
+            InputError: as `check_q`.
+
         Examples:
             >>> import kin
             >>> kin.get_robot("planar2r").in_limits([[0.0, 0.0], [9.0, 0.0]])
             array([ True, False])
         """
+        q = self.check_q(q)
         return np.asarray(((q >= self.lower - slack) & (q <= self.upper + slack)).all(axis=-1))
 
-    def clip(self, q: Array) -> Array:
+    def clip(self, q: ArrayLike) -> Array:
         """Configurations moved inside the joint limits, each joint to its nearest value.
 
         Args:
@@ -493,12 +497,15 @@ class Robot:
         Returns:
             ``(..., n)``.
 
+        Raises:
+            InputError: as `check_q`.
+
         Examples:
             >>> import kin
             >>> kin.get_robot("planar2r").clip([9.0, 0.5]).round(4)
             array([3.1416, 0.5   ])
         """
-        return np.clip(q, self.lower, self.upper)
+        return np.clip(self.check_q(q), self.lower, self.upper)
 
     def random_q(self, rng: np.random.Generator, size: int | tuple[int, ...] = ()) -> Array:
         """Random configurations, uniform inside the limits; an unlimited joint draws from ±π.

@@ -122,6 +122,14 @@ def test_another_base_and_tool():
         robot.with_tool(2.0 * np.eye(4))
 
 
+@pytest.mark.parametrize("name", ["in_limits", "clip"])
+@pytest.mark.parametrize("q", [[0.0], "12", [0.0, float("nan")]])
+def test_what_is_no_configuration_is_refused(name, q):
+    with pytest.raises(kin.InputError) as caught:
+        getattr(kin.get_robot("planar2r"), name)(q)
+    assert caught.value.field.startswith("q")
+
+
 def test_quaternions_are_public():
     T = kin.pose_from_position_wxyz([0, 0, 0], [0.6, 0.0, 0.8, 0.0])
     assert kin.wxyz_from_rotation(T[:3, :3]) == pytest.approx([0.6, 0.0, 0.8, 0.0])
