@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -169,20 +170,18 @@ def _run_rows(robot: Robot, arguments: Namespace, units: Units, q_seed: Array | 
 
 def _options(robot: Robot, arguments: Namespace, units: Units, task: Task, shown: int | None = 1) -> IKOptions:
     """What was typed, but for target, seed and frame; `shown`: how many solutions by default, None for all."""
-    given = {name: _option(arguments, option, units) for name, option in declared().items()}
-    constraints = joint_constraints(robot, arguments)
+    names = [each.name for each in fields(IKOptions) if each.name != "constraints"]
+    given = {name: _option(arguments, declared()[name], units) for name in names}
     given |= {
         "task": task,
         "mask": None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
-        "limits": constraints.limits,
-        "locked": constraints.locked,
-        "wider_limits": constraints.wider_limits,
+        "constraints": joint_constraints(robot, arguments),
         "respect_limits": not arguments.ignore_limits,
         "redundancy": _redundancy(arguments, units),
         "max_solutions": None if arguments.all else arguments.max_solutions or shown,
         "obstacles": obstacles_of(arguments),
     }
-    return IKOptions.of(None, **given)
+    return IKOptions(**given)
 
 
 def _vector(texts: list[str], unit: Unit, field: str) -> list[float]:
