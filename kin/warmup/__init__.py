@@ -91,18 +91,18 @@ def warm_up(everything: bool = False) -> None:
         warm_up_rest()
 
 
-def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = False) -> None:
-    """Load or compile all remaining kernels; `stop` is checked before each step, which may take many seconds.
+def warm_up_rest(cancelled: Callable[[], bool] = lambda: False, *, backwards: bool = False) -> None:
+    """Load or compile all remaining kernels; `cancelled` is asked before each step, which may take many seconds.
 
     Two processes that begin at opposite ends compile different kernels and load the others from the cache.
 
     Args:
-        stop: returns True to end the compilation.
+        cancelled: returns True to end the compilation.
         backwards: begin with the last kernels.
     """
     steps = [step for part in parts().values() for step in part]
     for step in reversed(steps) if backwards else steps:
-        if stop():
+        if cancelled():
             return
         step()
 
