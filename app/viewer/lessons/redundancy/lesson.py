@@ -155,8 +155,8 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         nearest = min((min(max(x, low), high) for x in images), key=lambda v: min(abs(v - x) for x in images))
         arrival = MOVING
         if min(abs(nearest - x) for x in images) > 1e-3:
-            ring = self.facts.ring
-            end = next((e for e in ring.ends if abs(e.value - nearest) < 1e-3), None) if ring else None
+            known = self._ring(self.facts).ends  # the drawn ones may be of another target
+            end = next((e for e in known if abs(e.value - nearest) < 1e-3), None)
             reason = (
                 "The posture ends here"
                 if end is None or end.joint < 0
