@@ -21,8 +21,10 @@ from kin.ik.details import OrientationNotMet, RotationError, Solved
 from kin.ik.messages import explain
 from kin.units import DEFAULT_UNITS, typeset
 
-QUICK = ("ur5e", "pioneer5")
-ARMS = (*QUICK, "redundant7-craig", "panda", "crx10ia", "so101", "puma560", "scara", "stanford", "redundant7")
+ARMS = (
+    *("pioneer5", "redundant7-craig", "ur5e", "panda", "crx10ia", "so101", "puma560", "scara", "stanford"),
+    "redundant7",
+)
 NUMBER = re.compile(r"\d[\d.]*(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 ASK = """
 const { about, T, seeds } = JSON.parse(require("node:fs").readFileSync(process.argv[2], "utf8"));
@@ -38,10 +40,6 @@ console.log(JSON.stringify(T.map((target, i) => {
   return { ...found, text: words.text(found), names, free, value };
 })));
 """
-
-
-def marked(arms):
-    return [pytest.param(i, marks=() if i in QUICK else pytest.mark.full) for i in arms]
 
 
 def targets(robot: kin.Robot):
@@ -79,7 +77,7 @@ def said(result: kin.IKResult) -> str:
     return typeset(explain(details, result.cause, "pose", (), DEFAULT_UNITS).text)
 
 
-@pytest.mark.parametrize("robot_id", marked(ARMS))
+@pytest.mark.parametrize("robot_id", ARMS)
 def test_statuses_postures_and_sentences_are_those_of_the_product(robot_id, tmp_path):
     robot = kin.get_robot(robot_id)
     T, seeds = targets(robot)
@@ -159,7 +157,7 @@ def test_what_does_not_count_for_other_targets_is_said(tmp_path):
     assert "do not count" not in web_page(SavedArm(ur5, ur5.q_home))
 
 
-@pytest.mark.parametrize("robot_id", marked(kin.builtin_robots()))
+@pytest.mark.parametrize("robot_id", kin.builtin_robots())
 def test_a_page_is_small(robot_id):
     robot = kin.get_robot(robot_id)
     page = web_page(SavedArm(robot, robot.q_home, drawing(robot), target=kin.fk(robot, robot.q_home))).encode()
