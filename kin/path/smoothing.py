@@ -13,18 +13,18 @@ import numpy as np
 
 from kin.fk import fk
 from kin.kernels.compile import jit
-from kin.kernels.jacobian import jacobian_into
+from kin.kernels.fk import fk_into
 from kin.path.configurations import branches_near, descended, meeting
 from kin.path.viterbi import shortest
 from kin.path.waypoints import LayerSequence, Waypoint, has_closed_form
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION
-from kin.solvers.numeric.error import mask_rows
+from kin.solvers.numeric.error import relative_pose
 from kin.transforms import Array
 
 # Rounds, relative improvement that is not worth another one, largest pull on a jump; stiffness off the tangent and
-# of a joint held at its limit, radians that a joint may move in one step.
+# of a joint held at its limit, radians that a joint may move in one step, half the width of a difference.
 _ROUNDS, _CONVERGED, _MOST_PULL = 24, 1e-5, 256.0
-_STIFF, _RIGID, _TRUST = 1e6, 1e9, 0.6
+_STIFF, _RIGID, _TRUST, _DELTA = 1e6, 1e9, 0.6, 1e-6
 
 
 def smoothed(sequence: LayerSequence, q: Array) -> Array:
@@ -76,7 +76,7 @@ def _newton_step(sequence: LayerSequence, q: Array, pull: float) -> Array:
         if waypoint.problem.code != MASK:
             kept = {POSE: 6, APPROACH: 5, POSITION: 3}[waypoint.problem.code]
             target, mask = fk(problem.robot, row), np.array([float(r < kept) for r in range(6)] + [0.0])
-        _tangent(problem.robot.model, target, mask, row, out)
+        _tangent(problem.robot.model, target, mask, row.copy(), out)
     stiffness = np.array([settings.start_weight, *(1.0 / span for span in sequence.spans[1:]), 0.0])
     springs = stiffness[:, None] * weight**2
     springs[sequence.jumps(q)] *= pull
@@ -120,7 +120,14 @@ def _sweep(blocks: Array, links: Array, right: Array) -> Array:
 
 @jit
 def _tangent(model: Array, target: Array, mask: Array, q: Array, out: Array) -> None:
-    """out ← derivative ``(6, n)`` of the masked coordinates of `relative_pose`."""
-    T, axes, e = np.empty((4, 4)), np.empty((q.shape[0], 7)), np.empty(6)
-    jacobian_into(model, q, out, T, axes)
-    mask_rows(T, target, mask, e, out)
+    """out ← derivative ``(6, n)`` of the masked coordinates of `relative_pose`, by central differences."""
+    T, e = np.empty((4, 4)), np.empty(6)
+    for j in range(q.shape[0]):
+        x = q[j]
+        for side in range(2):
+            q[j] = x + _DELTA if side == 0 else x - _DELTA
+            fk_into(model, q, T)
+            relative_pose(T, target, mask[6] == 0.0, e)
+            for r in range(6):
+                out[r, j] = e[r] if side == 0 else mask[r] * (out[r, j] - e[r]) / (2.0 * _DELTA)
+        q[j] = x
