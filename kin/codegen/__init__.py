@@ -8,8 +8,8 @@ The very kernels that are compiled by numba, and tested, are read as source:
 2. :mod:`~kin.codegen.rooms` finds the size of every array, so that C needs no heap.
 3. :mod:`~kin.codegen.c` and :mod:`~kin.codegen.js` write the trees (:mod:`~kin.codegen.emit` is what they share).
 4. :mod:`~kin.codegen.entries` are what generated code offers, kernels themselves, and
-   :mod:`~kin.codegen.families` says how each family of closed forms is asked; :mod:`~kin.codegen.arm` and
-   :mod:`~kin.codegen.files` make one file.
+   :mod:`~kin.codegen.families` says how each family of closed forms is asked, :mod:`~kin.codegen.wrappers` how
+   arms are that are solved as other ones; :mod:`~kin.codegen.arm` and :mod:`~kin.codegen.files` make one file.
 
 Only `kin.generate` imports it, when it is called.
 """

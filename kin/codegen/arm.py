@@ -9,7 +9,7 @@ import numpy as np
 
 from kin.angles import TURN
 from kin.codegen import entries
-from kin.codegen.families import Alone, alone, refused
+from kin.codegen.families import BOUNDS, Alone, alone, needs_python
 from kin.codegen.rooms import Rooms
 from kin.codegen.source import PRIMITIVES, OutsideSubsetError, Primitives, plain
 from kin.codegen.tree import Instance
@@ -58,12 +58,6 @@ class Arm:
         """How many configurations a pose has at most."""
         return len(self.form.branches)
 
-    @property
-    def sense(self) -> float:
-        """−1.0 if the redundancy parameter is a joint that is reversed."""
-        joint = -1 if self.parameter is None else self.parameter.joint
-        return float(self.alone.signs[joint]) if joint >= 0 else 1.0
-
 
 def arm_of(robot: Robot, closest: bool = True, primitives: Primitives = PRIMITIVES) -> Arm:
     """The program of an arm.
@@ -84,22 +78,18 @@ def arm_of(robot: Robot, closest: bool = True, primitives: Primitives = PRIMITIV
     if parameter is not None and parameter.joint >= 0:
         held[parameter.joint] = 0.0
     constants = {
-        "model": np.asarray(robot.model), "params": found.params, "signs": found.signs, "lower": robot.lower,
-        "upper": robot.upper, "turns": turns, "held": held, "weights": weights(robot),
+        "model": np.asarray(robot.model), "params": found.params, "lower": robot.lower, "upper": robot.upper,
+        "turns": turns, "held": held, "weights": weights(robot),
     }  # fmt: skip
     if closest:
         constants["starts"] = spread(robot.lower, robot.upper, STARTS)
-    program, rooms, made = Program(primitives), Rooms(found.bounds), {}
+    program, rooms, made = Program(primitives), Rooms(BOUNDS), {}
     try:
         for name, (kernel, kinds, shapes) in _entries(robot, form, found, parameter, constants, closest).items():
             made[name] = program.add(kernel, *kinds)
             rooms.enter(made[name], shapes)
     except OutsideSubsetError as error:
-        raise refused(
-            robot,
-            f"an arm whose kernels can be translated: those of {form.name} cannot; use kin.solve_ik or the REST "
-            "service",
-        ) from error
+        raise needs_python(robot, form) from error
     return Arm(robot, form, found, parameter, constants, program, rooms, made)
 
 
@@ -112,39 +102,26 @@ def _entries(
     kernels = Kernel(plain(found.rows)), Kernel(plain(found.inner))
     q, T, limits = (n,), (4, 4), ((n,), (n,), (n,), (n,))
     model, params, arcs = constants["model"].shape, found.params.shape, (entries.ROWS_OF_ARCS, 3)
-    rows = (k, n), (k, 5), (k,), (k,), (k,)
+    rows, one = (((m, n), (m, 5), (m,), (m,), (m,)) for m in (k, 1))
     made = {
         "fk": (fk_one, (_V, _V, _M), (model, q, T)),
         "jacobian": (jacobian_one, (_V, _V, _M), (model, q, (6, n))),
         "solve": (
             entries.solve,
-            (*kernels, _V, _V, _V, _M, _V, _LIMITS, FLOAT, _M, _ROWS),
-            (None, None, model, params, q, T, q, limits, None, arcs, rows),
+            (*kernels, _V, _V, _M, _V, _LIMITS, FLOAT, _M, _ROWS),
+            (None, None, model, params, T, q, limits, None, arcs, rows),
         ),
     }
     if parameter is not None and not found.needs_value:
         made["intervals"] = (
             entries.intervals,
-            (*kernels, _V, _V, _M, _V, _LIMITS, FLOAT, _M, _M),
-            (None, None, params, q, T, q, limits, None, (k, n), (4 * entries.ROWS_OF_ARCS + 2, 3)),
+            (*kernels, _V, _M, _V, _LIMITS, BOOL, _M, _M),
+            (None, None, params, T, q, limits, None, (k, n), (4 * entries.ROWS_OF_ARCS + 2, 3)),
         )
     if closest:
         made["nearest"] = (
             entries.nearest,
-            (*kernels, _V, _V, _V, _M, _V, _M, _M, _LIMITS, BOOL, _ROWS),
-            (
-                None,
-                None,
-                model,
-                params,
-                q,
-                T,
-                q,
-                (k, n),
-                constants["starts"].shape,
-                limits,
-                None,
-                ((1, n), (1, 5), (1,), (1,), (1,)),
-            ),
+            (*kernels, _V, _V, _M, _V, _M, _M, _LIMITS, BOOL, _ROWS),
+            (None, None, model, params, T, q, (k, n), constants["starts"].shape, limits, None, one),
         )
     return made

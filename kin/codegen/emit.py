@@ -255,11 +255,11 @@ class Emitter:
             return self.operator(value)
         rank = _RANKS[symbol]
         word = {"or": "||", "and": "&&", "==": self.equal, "!=": self.different}.get(symbol, symbol)
-        # `or` beside `and` gets brackets too, as compilers ask for.
+        # `or` beside `and`, and `==` of comparisons, get brackets too, as compilers ask for.
         inner = AND + 1 if rank == OR and isinstance(value.a, Operation) and value.a.symbol == "and" else rank
-        right = self.text(value.b, max(rank, AND) + 1)
+        right = self.text(value.b, ADD if rank == EQUAL else max(rank, AND) + 1)
         right = f"({right})" if right.startswith("-") else right
-        return f"{self.text(value.a, inner if rank != EQUAL else rank + 1)} {word} {right}", rank
+        return f"{self.text(value.a, ADD if rank == EQUAL else inner)} {word} {right}", rank
 
     def unary(self, kind: Type, symbol: str, a: Expr) -> Text:
         text = self.text(a, ATOM)

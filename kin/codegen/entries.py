@@ -1,7 +1,7 @@
 """The kernels that generated code calls, in the subset: what `kin.solve_ik` does of one target without words.
 
 They are never compiled by numba. A closed form enters as two kernels: `rows`, one of those of
-:mod:`kin.codegen.families`, and the kernel of the family that it calls.
+:mod:`kin.codegen.families`, and what it calls.
 """
 
 from __future__ import annotations
@@ -45,29 +45,9 @@ _MINIMUM = TOLERANCES.same_minimum_angle
 _ALIKE, _SHARE = TOLERANCES.better_minimum, TOLERANCES.better_minimum_share
 
 
-def branches(
-    rows: Inner, inner: Inner, params: Array, signs: Array, T: Array, seed: Array, limits: Limits,
-    value: float, arcs: Array, q: Array,
-) -> tuple[float, int]:  # fmt: skip
-    """q ``(k, n)`` ← the rows of the closed form, of which some joints may be reversed: (gap, number of arcs)."""
-    lower, upper, _, _ = limits
-    n = seed.shape[0]
-    near, low, high = np.empty(n), np.empty(n), np.empty(n)
-    for j in range(n):
-        reversed_ = signs[j] < 0.0
-        near[j] = signs[j] * seed[j]
-        low[j] = -upper[j] if reversed_ else lower[j]
-        high[j] = -lower[j] if reversed_ else upper[j]
-    gap, count = rows(inner, params, T, value, near, (low, high), arcs, q)
-    for i in range(q.shape[0]):
-        for j in range(n):
-            q[i, j] = q[i, j] * signs[j]
-    return gap, count
-
-
 def solve(
-    rows: Inner, inner: Inner, model: Array, params: Array, signs: Array, target: Array, seed: Array,
-    limits: Limits, value: float, arcs: Array, found: Rows,
+    rows: Inner, inner: Inner, model: Array, params: Array, target: Array, seed: Array, limits: Limits,
+    value: float, arcs: Array, found: Rows,
 ) -> tuple[int, int]:  # fmt: skip
     """Configurations of a pose: (what kind of answer, how many of found.order).
 
@@ -80,7 +60,7 @@ def solve(
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
         return INVALID, 0
-    branches(rows, inner, params, signs, T, seed, limits, value, arcs, found.q)
+    rows(inner, params, T, value, seed, (limits[0], limits[1]), arcs, found.q)
     pose = _requirement(model, limits, POSE)
     count = measure_and_sort(pose, T, seed, seed, found)
     if count < 0:
@@ -172,30 +152,24 @@ def _taken(found: Rows, key: Array) -> int:
 
 
 def intervals(
-    rows: Inner, inner: Inner, params: Array, signs: Array, target: Array, seed: Array, limits: Limits,
-    sense: float, q: Array, out: Array,
+    rows: Inner, inner: Inner, params: Array, target: Array, seed: Array, limits: Limits, circular: bool,
+    q: Array, out: Array,
 ) -> int:  # fmt: skip
     """out ``(m, 3)`` ← rows (branch, low, high): the values of the redundancy parameter that the limits allow.
 
-    Those of each branch, sorted and joined; on a circle in (−π, π]. sense: −1.0 if the parameter is a joint that
-    is reversed. Returns their number, or INVALID.
+    Those of each branch, sorted and joined; if they are circular in (−π, π]. Returns their number, or INVALID.
     """
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
         return INVALID
     arcs = np.empty((ROWS_OF_ARCS, 3))
-    count = branches(rows, inner, params, signs, T, seed, limits, math.nan, arcs, q)[1]
+    count = rows(inner, params, T, math.nan, seed, (limits[0], limits[1]), arcs, q)
     together = np.zeros(q.shape[0], dtype=np.bool_)
-    for i in range(max(count, 0)):
-        if sense < 0.0:
-            low = -arcs[i, 2]
-            arcs[i, 2] = -arcs[i, 1]
-            arcs[i, 1] = low
-    return ranges(arcs[: max(count, 0)], np.arange(q.shape[0]), together, True, out)
+    return ranges(arcs[: max(count, 0)], np.arange(q.shape[0]), together, circular, out)
 
 
 def nearest(
-    rows: Inner, inner: Inner, model: Array, params: Array, signs: Array, target: Array, seed: Array, known: Array,
+    rows: Inner, inner: Inner, model: Array, params: Array, target: Array, seed: Array, known: Array,
     starts: Array, limits: Limits, point: bool, found: Rows,
 ) -> int:  # fmt: skip
     """found.q[0] ← the configuration inside the limits that comes nearest to a pose, or first to its point.
@@ -208,7 +182,8 @@ def nearest(
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
         return INVALID
-    branches(rows, inner, params, signs, T, seed, limits, math.nan, np.empty((ROWS_OF_ARCS, 3)), known)
+    lower, upper, turns, _ = limits
+    rows(inner, params, T, math.nan, seed, (lower, upper), np.empty((ROWS_OF_ARCS, 3)), known)
     n, m = seed.shape[0], starts.shape[0]
     size = 1 + known.shape[0] + m
     q, costs = np.empty((size, n)), np.empty(size)
@@ -226,7 +201,6 @@ def nearest(
         count += 1
     task, weight, enough = (POSITION, 1.0, 1e-11) if point else (POSE, WEIGHT, 0.0)
     goal = (T, task, np.zeros(7), weight)
-    lower, upper, turns, _ = limits
     count = each_of(model, goal, (lower, upper, turns), enough, MEETINGS, q[:count], costs)
     best = 0
     for i in range(count):

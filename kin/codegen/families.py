@@ -1,38 +1,55 @@
 """How generated code asks each family of closed forms for its branches.
 
 A family with a careful kernel, which also chooses free joints inside the limits, has an adapter here from the
-arguments that all have in common to its own. One that leaves nothing free in a pose is asked by its `one`.
+arguments that all have in common to its own. One that leaves nothing free in a pose is asked by its `one`. What
+the solver of another arm does for one is in :mod:`kin.codegen.wrappers`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from functools import singledispatch
+from collections.abc import Callable
 from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from kin.angles import TURN
+from kin.axes import screw_x, screw_z
+from kin.codegen import wrappers
 from kin.codegen.source import plain
+from kin.codegen.types import Constants
 from kin.errors import InputError
 from kin.robot import Robot
+from kin.solvers import closed_form_of
 from kin.solvers.collinear7.branches import solve as solve_collinear7
 from kin.solvers.collinear7.closed_form import Collinear7
-from kin.solvers.contract import POSE, ClosedForm
+from kin.solvers.common import UNBOUNDED
+from kin.solvers.contract import POSE, BatchKernels, ClosedForm
 from kin.solvers.coupled import Coupled
+from kin.solvers.general5.closed_form import General5
+from kin.solvers.general5.completion import BALL, completed
+from kin.solvers.general5.point import Point3
 from kin.solvers.general6 import batch as general6_batch
 from kin.solvers.general6.closed_form import General6
-from kin.solvers.offset7.branches import branches_one as branches_offset7
+from kin.solvers.general7.closed_form import General7
+from kin.solvers.offset7.answers import answer as answer_offset7
 from kin.solvers.offset7.closed_form import Offset7
+from kin.solvers.offset7.geometry import REVERSED
+from kin.solvers.offset7.places import SAMPLES
+from kin.solvers.offset7.ranges import INTERVALS
 from kin.solvers.parallel5.branches import solve as solve_parallel5
 from kin.solvers.parallel5.closed_form import Parallel5
 from kin.solvers.parallel6.branches import solve as solve_parallel6
 from kin.solvers.parallel6.closed_form import Parallel6
+from kin.solvers.planar4.branches import solve as solve_planar4
+from kin.solvers.planar4.closed_form import Planar4
 from kin.solvers.reversed import ReversedJoints, WrappedKernels
 from kin.solvers.rounded.closed_form import Rounded
+from kin.solvers.scaled import Scaled
 from kin.solvers.srs7.branches import solve as solve_srs7
 from kin.solvers.srs7.closed_form import Srs7
+from kin.solvers.turned.closed_form import Turned
 from kin.solvers.wrist5.branches import solve as solve_wrist5
 from kin.solvers.wrist5.closed_form import Wrist5
 from kin.solvers.wrist6.branches import solve as solve_wrist6
@@ -41,94 +58,135 @@ from kin.transforms import Array
 
 Inner = Callable[..., Any]
 Limits = tuple[Array, Array]  # lower and upper
+# Of numbers that decide the size of an array and do not follow from the arm, see `Rooms`: rows that are sorted,
+# marks over at most one turn.
+BOUNDS = {
+    ("general6_batch_sort", "count"): general6_batch.SOLUTIONS,
+    ("offset7_places_marks_of", "n"): 2 * SAMPLES,
+}
+_ELSE = "Use kin.solve_ik, or the REST service"
+# Orientations in no special position, for a point whose orientation does not matter.
+_ANGLES = (0.4, 1.2, -2.2), (1.4, 0.9, -0.2)
+_TURNS = np.array([(screw_z(a, 0.0) @ screw_x(0.0, b) @ screw_z(c, 0.0))[:3, :3] for a, b, c in _ANGLES])
 
 
 class Alone(NamedTuple):
     """What generated code calls for the branches of a pose.
 
     Attributes:
-        rows: an adapter below: ``rows(inner, params, T, value, near, limits, arcs, q)`` writes the branches
-            to q ``(k, n)`` and the intervals of the redundancy parameter to arcs, and returns the gap and their
-            number.
-        inner: the kernel of the family that it calls.
-        params: what that reads.
-        signs: ``(n,)`` −1.0 for joints that are reversed.
+        rows: an adapter: ``rows(inner, params, T, value, near, limits, arcs, q)`` writes the branches
+            to q ``(k, n)`` and the intervals of the redundancy parameter to arcs, and returns their number.
+        inner: the kernel of the family that it calls; of a wrapper what it calls and the arm's numbers.
+        params: what the kernel reads.
         needs_value: whether the value of the redundancy parameter must be given.
-        bounds: of numbers that decide the size of an array and do not follow from the arm, see `Rooms`.
     """
 
     rows: Inner
-    inner: Inner
+    inner: Inner | Constants
     params: Array
-    signs: Array
     needs_value: bool = False
-    bounds: Mapping[tuple[str, str], int] = {}
+
+    def within(self, rows: Inner, **constants: Any) -> Alone:
+        """The same for another arm, whose branches an adapter of `kin.codegen.wrappers` makes of these."""
+        return self._replace(rows=rows, inner=Constants(rows=self.rows, inner=self.inner, **constants))
 
 
 def as_it_is(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """A kernel with these very arguments."""
-    gap, count = inner(params, T, value, near, limits[0], limits[1], arcs, q)
-    return gap, count
+    _, count = inner(params, T, value, near, limits[0], limits[1], arcs, q)
+    return int(count)
 
 
 def without_limits(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """A family's `one`."""
     inner(params, T, value, near, q)
-    return 0.0, 0
+    return 0
 
 
 def of_wrist5(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """Five joint values of six columns."""
     out = np.empty((8, 6))
-    gap, count = inner(params, T, value, near, limits[0], limits[1], arcs, out)
+    _, count = inner(params, T, value, near, limits[0], limits[1], arcs, out)
     _copy(out, q)
-    return gap, count
+    return int(count)
+
+
+def of_planar4(
+    inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
+) -> int:
+    """The direction of the third link is `value`, or the feasible one nearest to the seed's."""
+    out = np.empty((2, 5))
+    _, count = inner(params, T, POSE, value, near, limits[0], limits[1], arcs, out)
+    _copy(out, q)
+    return int(count)
 
 
 def of_parallel5(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """A pose leaves nothing free: the value is not used."""
     out = np.empty((4, 6))
-    gap, count = inner(params, T, (POSE, math.nan), near, limits[0], limits[1], arcs, out)
+    _, count = inner(params, T, (POSE, math.nan), near, limits[0], limits[1], arcs, out)
     _copy(out, q)
-    return gap, count
+    return int(count)
 
 
 def of_srs7(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """The arm angle is `value`, or the feasible one nearest to the seed's."""
     out = np.empty((8, 8))
-    _, gap, count = inner(params, T, (value, True, False, False), near, limits[0], limits[1], arcs, out)
+    _, _, count = inner(params, T, (value, True, False, False), near, limits[0], limits[1], arcs, out)
     _copy(out, q)
-    return gap, count
+    return int(count)
 
 
 def of_collinear7(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """θ1 is `value`, or the feasible one nearest to the seed's."""
     out, rolls = np.empty((8, 9)), np.empty((256, 3))
-    gap, count, _ = inner(
+    _, count, _ = inner(
         params, T, (value, math.nan, 0.0, True, False), near, limits[0], limits[1], arcs, rolls, out
     )
     _copy(out, q)
-    return gap, count
+    return int(count)
+
+
+def of_offset7(
+    inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
+) -> int:
+    """The joint at the end is at `value`, or of each branch at the feasible value nearest to the seed."""
+    lower, upper = limits
+    out, found, joints = np.empty((8, 8)), np.empty((INTERVALS, 3)), np.empty((3, 7))
+    for j in range(7):
+        joints[0, j], joints[1, j], joints[2, j] = near[j], lower[j], upper[j]
+    once = inner(params, T, joints, value, math.isnan(value), 1.0, found, out)
+    _copy(out, q)
+    given = 6 if params[REVERSED] > 0.0 else 0
+    low, high = lower[given], upper[given]
+    turns, count = math.ceil((high - low) / TURN) if TURN < high - low < UNBOUNDED else 0, 0
+    for turn in range(-turns, turns + 1):
+        for i in range(once):
+            first, last = max(found[i, 1] + TURN * turn, low), min(found[i, 2] + TURN * turn, high)
+            if first <= last and count < arcs.shape[0]:
+                arcs[count, 0], arcs[count, 1], arcs[count, 2] = found[i, 0], first, last
+                count += 1
+    return count
 
 
 def of_general6(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> tuple[float, int]:
+) -> int:
     """What the elimination finds."""
     inner(params, T, q)
-    return 0.0, 0
+    return 0
 
 
 def _copy(rows: Array, q: Array) -> None:
@@ -138,101 +196,136 @@ def _copy(rows: Array, q: Array) -> None:
             q[i, j] = rows[i, j]
 
 
+# Of the families with an adapter of their own: that, and the kernel that it calls.
+KERNELS: dict[type[ClosedForm], tuple[Inner, Inner]] = {
+    Wrist5: (of_wrist5, solve_wrist5),
+    Wrist6: (as_it_is, solve_wrist6),
+    Planar4: (of_planar4, solve_planar4),
+    Parallel5: (of_parallel5, solve_parallel5),
+    Parallel6: (as_it_is, solve_parallel6),
+    Srs7: (of_srs7, solve_srs7),
+    Collinear7: (of_collinear7, solve_collinear7),
+    Offset7: (of_offset7, answer_offset7),
+}
+
+
 def alone(robot: Robot, form: ClosedForm | None) -> Alone:
-    """What generated code calls for the branches of a robot.
+    """What generated code calls for the branches of a robot, or of an arm that stands for it.
 
     Raises:
         InputError: an arm whose solver is more than kernels, with why, and what would help.
     """
     if form is None:
-        raise refused(robot, "an arm with a closed form: this one is solved by descents from many starts")
-    return _alone(form, robot)
-
-
-def refused(robot: Robot, expected: str) -> InputError:
-    """The error for an arm that cannot be emitted."""
-    return InputError("robot", robot.id, expected)
-
-
-def _of(rows: Callable[..., Any], inner: Callable[..., Any], form: ClosedForm, n: int, **more: Any) -> Alone:
-    return Alone(rows, inner, np.asarray(form.kernels.params), np.ones(n), **more)
-
-
-@singledispatch
-def _alone(form: ClosedForm, robot: Robot) -> Alone:
-    inner = plain(form.kernels.one)
-    if isinstance(form.kernels, WrappedKernels) or form.redundancies(POSE) or not isinstance(inner, FunctionType):
-        raise refused(
-            robot,
-            f"an arm whose solver is made of kernels alone: that of this one ({form.name}) also needs Python. Use "
-            "kin.solve_ik, or the REST service",
+        raise InputError(
+            "robot",
+            robot.id,
+            f"an arm with a closed form: this one is solved by descents from many starts. {_ELSE}",
         )
-    return _of(without_limits, form.kernels.one, form, robot.n)
+    if isinstance(form, Rounded):
+        raise InputError(
+            "robot",
+            robot.id,
+            f"a table with exact numbers: this one is near an arm of the family {form.name}, but off by "
+            f"{form.off:.1g} rad or of the arm's size, so that every posture is refined on the table as entered. "
+            "Write angles such as pi/2 and lengths with all their digits, or 0",
+        )
+    if family := next((each for each in type(form).__mro__ if each in KERNELS), None):
+        rows, inner = KERNELS[family]
+        params = form.geometry.params if isinstance(form, Parallel5) else form.kernels.params
+        return Alone(rows, inner, np.asarray(params))
+    if type(form) in _WRAPPERS:
+        return _WRAPPERS[type(form)](form, robot)
+    if form.redundancies(POSE):
+        raise needs_python(robot, form)
+    return _by_one(form.kernels, form, robot)
 
 
-@_alone.register
-def _(form: ReversedJoints, robot: Robot) -> Alone:
-    return _alone(form.form, robot)._replace(signs=form.signs)
+def needs_python(robot: Robot, form: ClosedForm) -> InputError:
+    """The error for an arm of which parts of the solver are no kernels, or none that can be translated."""
+    expected = f"an arm whose solver is made of kernels alone: that of this one ({form.name}) also needs Python"
+    return InputError("robot", robot.id, f"{expected}. {_ELSE}")
 
 
-@_alone.register
-def _(form: Rounded, robot: Robot) -> Alone:
-    raise refused(
-        robot,
-        f"a table with exact numbers: this one is near an arm of the family {form.name}, but off by "
-        f"{form.off:.1g} rad or of the arm's size, so that every posture is refined on the table as entered. "
-        "Write angles such as pi/2 and lengths with all their digits, or 0",
+def _by_one(kernels: BatchKernels, form: ClosedForm, robot: Robot) -> Alone:
+    if isinstance(kernels, WrappedKernels) or not isinstance(plain(kernels.one), FunctionType):
+        raise needs_python(robot, form)
+    return Alone(without_limits, kernels.one, np.asarray(kernels.params))
+
+
+def _counted(form: ReversedJoints | Scaled, robot: Robot) -> Alone:
+    scales = form.signs if isinstance(form, ReversedJoints) else form.metres
+    joint = next((r.joint for r in form.redundancies(POSE) if not r.rare), -1)
+    return alone(robot, form.form).within(
+        wrappers.of_counted,
+        scales=scales,
+        unit=form.unit if isinstance(form, Scaled) else 1.0,
+        scale=1.0 if joint < 0 else float(scales[joint]),
     )
 
 
-@_alone.register
-def _(form: Coupled, robot: Robot) -> Alone:
-    raise refused(robot, "an arm without rows that follow other joints: enter the table of its free joints")
+def _general5(form: General5, robot: Robot) -> Alone:
+    inner = alone(robot, form.form)
+    if form.point:
+        return inner.within(wrappers.of_pairs, turns=_TURNS)
+    return inner.within(wrappers.of_completed, rolls=form.rolls)
 
 
-@_alone.register
-def _(form: Wrist5, robot: Robot) -> Alone:
-    return _of(of_wrist5, solve_wrist5, form, robot.n)
+def _point3(form: Point3, robot: Robot) -> Alone:
+    longer = completed(form.robot, BALL)
+    six = closed_form_of(longer)
+    if six is None:
+        raise needs_python(robot, form)
+    revolute = form.robot.revolute.astype(np.float64)
+    return alone(robot, six).within(wrappers.of_point, turns=_TURNS, count=len(six.branches), revolute=revolute)
 
 
-@_alone.register
-def _(form: Wrist6, robot: Robot) -> Alone:
-    return _of(as_it_is, solve_wrist6, form, robot.n)
+def _general6(form: General6, robot: Robot) -> Alone:
+    kernels, reading = form.kernels, form.reading
+    kernels = kernels.form if isinstance(kernels, WrappedKernels) else kernels
+    if plain(kernels.one) is not plain(general6_batch.branches_one):
+        raise needs_python(robot, form)
+    found = Alone(of_general6, general6_batch.solve_all, np.asarray(kernels.params))
+    if reading.is_itself:
+        return found
+    return found.within(wrappers.of_order, order=np.array(reading.order), inverted=reading.inverted)
 
 
-@_alone.register
-def _(form: Parallel6, robot: Robot) -> Alone:
-    return _of(as_it_is, solve_parallel6, form, robot.n)
+def _general7(form: General7, robot: Robot) -> Alone:
+    fold = form.fold
+    found = alone(robot, form.form).within(
+        wrappers.of_general7, joint=fold.joint, last=fold.last, axis=fold.axis, back=fold.back
+    )
+    return found._replace(needs_value=True)
 
 
-@_alone.register
-def _(form: Parallel5, robot: Robot) -> Alone:
-    return _of(of_parallel5, solve_parallel5, form, robot.n)._replace(params=np.asarray(form.geometry.params))
+def _turned(form: Turned, robot: Robot) -> Alone:
+    if form.whole is not None:
+        return alone(robot, form.whole)
+    assert isinstance(form.kernels, WrappedKernels)
+    inner = _by_one(form.kernels.form, form, robot)
+    return inner.within(wrappers.of_turned, axis=form.last.axis, model=np.asarray(form.last.others.model))
 
 
-@_alone.register
-def _(form: Srs7, robot: Robot) -> Alone:
-    return _of(of_srs7, solve_srs7, form, robot.n)
+def _coupled(form: Coupled, robot: Robot) -> Alone:
+    back = np.zeros(form.expansion.T.shape)
+    back[:, form.chosen] = form.back
+    return alone(robot, form.form).within(
+        wrappers.of_coupled,
+        count=form.free.n,
+        expansion=form.expansion,
+        back=back,
+        turns=robot.revolute.astype(np.float64),
+        revolute=form.free.revolute.astype(np.float64),
+    )
 
 
-@_alone.register
-def _(form: Collinear7, robot: Robot) -> Alone:
-    return _of(of_collinear7, solve_collinear7, form, robot.n)
-
-
-@_alone.register
-def _(form: Offset7, robot: Robot) -> Alone:
-    return _of(without_limits, branches_offset7, form, robot.n, needs_value=True)
-
-
-@_alone.register
-def _(form: General6, robot: Robot) -> Alone:
-    if plain(form.kernels.one) is not plain(general6_batch.branches_one):
-        raise refused(
-            robot,
-            "an arm whose axes the elimination reads from base to tool: this one is read in another order. Use "
-            "kin.solve_ik, or the REST service",
-        )
-    # It sorts the rows of its answer.
-    bounds = {("general6_batch_sort", "count"): general6_batch.SOLUTIONS}
-    return _of(of_general6, general6_batch.solve_all, form, robot.n, bounds=bounds)
+_WRAPPERS: dict[type[ClosedForm], Callable[[Any, Robot], Alone]] = {
+    ReversedJoints: _counted,
+    Scaled: _counted,
+    General5: _general5,
+    Point3: _point3,
+    General6: _general6,
+    General7: _general7,
+    Turned: _turned,
+    Coupled: _coupled,
+}

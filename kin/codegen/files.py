@@ -121,7 +121,7 @@ def _common(arm: Arm, name: str) -> dict[str, object]:
         "name": name, "NAME": name.upper(), "n": n, "k": arm.rows, "size_of_jacobian": 6 * n,
         "arcs": entries.ROWS_OF_ARCS, "intervals": _INTERVALS, "starts": len(arm.constants.get("starts", ())),
         "parameter": "" if arm.parameter is None else _ascii(arm.parameter.label),
-        "sense": "-" if arm.sense < 0.0 else "",
+        "circular": "true" if arm.parameter is not None and arm.parameter.circular else "false",
         "names": ",\n    ".join(f'"{_ascii(each)}"' for each in arm.form.branches),
         "intervals_kernel": made["intervals"].name if "intervals" in made else "",
         **{each: instance.name for each, instance in made.items() if each != "intervals"},
@@ -209,9 +209,10 @@ def _head(arm: Arm, name: str, kind: str) -> Iterable[str]:
     yield from _not_promised(arm)
     yield ""
     if kind == "c":
-        yield "No heap, no static state: any number of threads may call it. Everything is on the stack. To use it,"
-        yield f"#include it for the declarations, and compile it once with -D{name.upper()}_IMPLEMENTATION, not"
-        yield "together with another arm's. To try it:"
+        size = sum(arm.rooms.sizes.values()) / 125
+        yield "No heap, no static state: any number of threads may call it. Everything is on the stack, arrays of"
+        yield f"{size:.0f} kB in all. To use it, #include it for the declarations, and compile it once with"
+        yield f"-D{name.upper()}_IMPLEMENTATION, not together with another arm's. To try it:"
         yield f"  cc -std=c99 -O2 -D{name.upper()}_EXAMPLE {name}.c -lm"
     else:
         offered = {"ik": "ik(T, seed)", "ik_at": "ik_at(T, value, seed)", "intervals": "intervals(T, seed)"}

@@ -45,7 +45,7 @@ class Rooms:
     """The numbers of entries of all arrays that kernels make, found by following the entries' calls.
 
     Args:
-        known: bounds of parameters that do not follow, by the names of kernel and parameter.
+        known: bounds of variables that do not follow, by the names of kernel and variable.
     """
 
     def __init__(self, known: Mapping[tuple[str, str], int]) -> None:
@@ -72,17 +72,18 @@ class _Following:
 
     def __init__(self, rooms: Rooms, made: Instance, arguments: Sequence[Bound]) -> None:
         self.rooms, self.made = rooms, made
-        self.bounds = dict(zip(made.parameters, arguments, strict=True))
-        self.bounds |= {name: rooms.known.get((made.name, name), bound) for name, bound in self.bounds.items()}
+        self.bounds: dict[str, Bound] = {}
+        for name, bound in zip(made.parameters, arguments, strict=True):
+            self._note(name, bound)
 
     def run(self) -> Bound:
         for settling in range(_PASSES):
             before = dict(self.bounds)
             for node in walk(self.made.body):
                 if isinstance(node, Assign):
-                    self._note(node.name, node.value.kind, self.of(node.value))
+                    self._note(node.name, self.of(node.value))
                 elif isinstance(node, For):
-                    self._note(node.name, INT, self.of(node.end if node.step > 0 else node.start))
+                    self._note(node.name, self.of(node.end if node.step > 0 else node.start))
             if self.bounds == before:
                 break
             if settling > 2:  # what still grows has no bound
@@ -98,9 +99,9 @@ class _Following:
                 result = bound if result is None else _largest(result, bound)
         return result
 
-    def _note(self, name: str, kind: Type, bound: Bound) -> None:
-        known = self.bounds.get(name)
-        self.bounds[name] = bound if name not in self.bounds else _largest(known, bound)
+    def _note(self, name: str, bound: Bound) -> None:
+        bound = self.rooms.known.get((self.made.name, name), bound)
+        self.bounds[name] = bound if name not in self.bounds else _largest(self.bounds[name], bound)
 
     def _measure(self, node: New | Copy) -> None:
         shape = self.of(node)

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, Scalar, TupleOf, Type
+from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, Constants, Scalar, TupleOf, Type
 from kin.kernels import simd
 
 MISSING = object()
@@ -81,7 +81,7 @@ def tree_of(function: FunctionType) -> ast.FunctionDef:
 class Scope:
     """Names and constants as one kernel sees them."""
 
-    def __init__(self, function: FunctionType, kernels: dict[str, FunctionType]) -> None:
+    def __init__(self, function: FunctionType, kernels: Mapping[str, FunctionType | Constants]) -> None:
         self.function, self.tree, self.kernels = function, tree_of(function), kernels
         names = [n.id for n in ast.walk(self.tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
         self.own = {*names, *(each.arg for each in self.tree.args.args)}
@@ -103,7 +103,8 @@ class Scope:
                 return getattr(builtins, node.id, MISSING) if found is MISSING else plain(found)
             case ast.Attribute():
                 base = self.constant(node.value)
-                return plain(getattr(base, node.attr, MISSING)) if isinstance(base, ModuleType) else MISSING
+                owns = isinstance(base, ModuleType | Constants)
+                return plain(getattr(base, node.attr, MISSING)) if owns else MISSING
             case ast.UnaryOp(op=ast.USub()):
                 inner = self.number(node.operand)
                 return MISSING if inner is MISSING else -inner

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import FunctionType
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,21 @@ class TupleOf:
         return len(set(self.items)) == 1
 
 
+class Constants:
+    """What a kernel reads as attributes of an argument: numbers, arrays and kernels that do not change."""
+
+    def __init__(self, **values: Any) -> None:
+        vars(self).update(values)
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(name)
+
+
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel that is passed as an argument: its callee is compiled once for each."""
+    """A kernel, or constants, passed as an argument: the callee is compiled once for each."""
 
-    function: FunctionType
+    value: FunctionType | Constants
 
 
 Type = Scalar | ArrayOf | TupleOf | Kernel

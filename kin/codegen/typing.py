@@ -53,6 +53,7 @@ from kin.codegen.types import (
     INT,
     NONE,
     ArrayOf,
+    Constants,
     Kernel,
     Scalar,
     TupleOf,
@@ -128,7 +129,7 @@ class _Builder(Calls):
     def __init__(self, program: Program, function: FunctionType, kinds: tuple[Type, ...]) -> None:
         arguments = tree_of(function).args
         names = tuple(each.arg for each in arguments.args)
-        kernels = {n: k.function for n, k in zip(names, kinds, strict=False) if isinstance(k, Kernel)}
+        kernels = {n: k.value for n, k in zip(names, kinds, strict=False) if isinstance(k, Kernel)}
         super().__init__(function, kernels)
         plain_arguments = not (arguments.defaults or arguments.kwonlyargs or arguments.vararg or arguments.kwarg)
         if len(names) != len(kinds) or not plain_arguments:
@@ -305,7 +306,8 @@ class _Builder(Calls):
         found: list[Statement] = []
         if isinstance(value, Items):
             values = list(value.items)
-            if not any(isinstance(each.kind, ArrayOf) for each in values) and _conflict(targets, values):
+            computed = any(isinstance(each, Operation) and isinstance(each.kind, ArrayOf) for each in values)
+            if not computed and _conflict(targets, values):
                 for k, each in enumerate(values):
                     if not isinstance(each, Literal):
                         found += self.assign(node, self.fresh(), each)
@@ -412,7 +414,7 @@ class _Builder(Calls):
             case np.ndarray() if value.flags.c_contiguous and value.dtype.type in source.ITEMS:
                 name = node.id if isinstance(node, ast.Name) else getattr(node, "attr", "")
                 return Table(ArrayOf(source.ITEMS[value.dtype.type], value.ndim), self.program.table(name, value))
-            case FunctionType():
+            case FunctionType() | Constants():
                 return Literal(Kernel(value), None)
         raise self.refuse(node, f"a constant of type {type(value).__name__}", "use numbers, tuples and arrays")
 

@@ -36,7 +36,7 @@ from kin.transforms import Array
 Flags = NDArray[np.bool_]
 _THETA = re.compile(r"θ(\d)")
 _MOST = 8  # axes of a free arm: no closed form has more
-_APART = 0.05  # rad or m by which a row may miss the value that the joints give it: a target may be rounded
+APART = 0.05  # rad or m by which a row may miss the value that the joints give it: a target may be rounded
 _SINGULAR = 1e-7  # of the largest singular value
 
 
@@ -99,14 +99,16 @@ class Coupled(ClosedForm):
     Attributes:
         free: the arm in which every row moves by itself.
         form: its closed form.
+        expansion: A ``(m, n)``.
+        chosen, back: the rows of A that give the joints' values, and their inverse ``(n, n)``.
     """
 
     def __init__(self, robot: Robot, free: Robot, form: ClosedForm, A: Array, chosen: list[int]) -> None:
         self.robot, self.free, self.form = robot, free, form
-        self._A, self._chosen = A, chosen
-        self._back = np.linalg.inv(A[chosen])
-        self._back[np.ix_(robot.revolute, free.revolute[chosen])] = np.round(
-            self._back[np.ix_(robot.revolute, free.revolute[chosen])]
+        self.expansion, self.chosen = A, chosen
+        self.back = np.linalg.inv(A[chosen])
+        self.back[np.ix_(robot.revolute, free.revolute[chosen])] = np.round(
+            self.back[np.ix_(robot.revolute, free.revolute[chosen])]
         )
         self.name, self.title, self.lengths = form.name, form.title, form.lengths
         self.reason = f"{form.reason}; {robot.n} joints move these {free.n} axes"
@@ -127,12 +129,13 @@ class Coupled(ClosedForm):
     def solve(self, problem: SolverInput) -> Candidates:
         """The configurations of the free arm that the joints can make."""
         wide = np.full(self.free.n, UNBOUNDED)
-        found = self.form.solve(replace(problem, values=(), seed=self._A @ problem.seed, lower=-wide, upper=wide))
+        seed = self.expansion @ problem.seed
+        found = self.form.solve(replace(problem, values=(), seed=seed, lower=-wide, upper=wide))
         t = found.q
-        q = t[:, self._chosen] @ self._back.T
-        apart = t - q @ self._A.T
+        q = t[:, self.chosen] @ self.back.T
+        apart = t - q @ self.expansion.T
         apart = np.where(self.free.revolute, images_near(apart), apart)
-        possible = np.abs(apart).max(axis=1) < _APART  # NaN is not
+        possible = np.abs(apart).max(axis=1) < APART  # NaN is not
         completeness = found.completeness if self._is_isolated(t) else "unknown"
         q = np.where(possible[:, None], np.where(self.robot.revolute, images_near(q), q), math.nan)
         return Candidates(q, np.empty((len(q), 0)), (), found.gap, found.obstacle, completeness)
@@ -149,7 +152,7 @@ class Coupled(ClosedForm):
 
     def branch_of(self, q: Array) -> int:
         """The branch of the free arm."""
-        return self.form.branch_of(self._A @ q)
+        return self.form.branch_of(self.expansion @ q)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The nearest one by its singular value: the free arm's are others."""

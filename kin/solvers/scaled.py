@@ -78,6 +78,7 @@ class Scaled(WrappedForm):
     Attributes:
         form: the closed form in that unit.
         unit: metres.
+        metres: of each joint value in the unit; 1.0 for an angle ``(n,)``.
     """
 
     def __init__(self, form: ClosedForm, robot: Robot, unit: float) -> None:
@@ -88,12 +89,12 @@ class Scaled(WrappedForm):
         )  # fmt: skip
         self.exact_ranges, self.off, self.quick = form.exact_ranges, form.off, form.quick
         self.lengths = tuple(length * unit for length in form.lengths)
-        self._metres = np.where(robot.revolute, 1.0, unit)  # of a joint value in the unit; or radians
+        self.metres = np.where(robot.revolute, 1.0, unit)
         self.kernels = self._kernels(form.kernels)
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
         """The batch kernels: those of the form, between a change of units and back."""
-        metres, given = self._metres, self.form.redundancies(POSE)[:1] if self.handles(POSE) else ()
+        metres, given = self.metres, self.form.redundancies(POSE)[:1] if self.handles(POSE) else ()
         (each,) = self._sizes(given) or [1.0]
 
         def one(_: Array, T: Array, value: float, near: Array, out: Array) -> bool:
@@ -113,11 +114,11 @@ class Scaled(WrappedForm):
 
     def _sizes(self, parameters: Sequence[RedundancyParameter]) -> list[float]:
         """Metres, or radians, of each redundancy parameter in the unit."""
-        return [float(self._metres[p.joint]) if p.joint >= 0 else 1.0 for p in parameters]
+        return [float(self.metres[p.joint]) if p.joint >= 0 else 1.0 for p in parameters]
 
     def solve(self, problem: SolverInput) -> Candidates:
         """The branches, with joint values, ranges and gaps in metres."""
-        p, metres, sizes = problem, self._metres, self._sizes(self.form.redundancies(problem.task))
+        p, metres, sizes = problem, self.metres, self._sizes(self.form.redundancies(problem.task))
         values = tuple(value / each for value, each in zip(p.values, sizes, strict=True))
         seed, lower, upper = p.seed / metres, p.lower / metres, p.upper / metres
         found = self.form.solve(
@@ -136,13 +137,13 @@ class Scaled(WrappedForm):
 
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many targets."""
-        metres = self._metres
+        metres = self.metres
         self.form.solve_many(self._target(T), seeds / metres, lower / metres, upper / metres, q)
         q *= metres
 
     def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """Of many targets the branch nearest to the seed."""
-        metres = self._metres
+        metres = self.metres
         found = self.form.nearest_many(self._target(T), seeds / metres, lower / metres, upper / metres, q)
         if found:
             q *= metres
@@ -151,13 +152,13 @@ class Scaled(WrappedForm):
     def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
         """One branch at each value."""
         (each,) = self._sizes(self.form.redundancies(POSE)[:1])
-        return self.form.rows_at(self._target(T), values / each, near / self._metres, branches) * self._metres
+        return self.form.rows_at(self._target(T), values / each, near / self.metres, branches) * self.metres
 
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
         """Those that the form adds."""
-        found = q / self._metres
-        completeness = self.form.add_missing(self._target(T), near / self._metres, found)
-        q[:] = found * self._metres
+        found = q / self.metres
+        completeness = self.form.add_missing(self._target(T), near / self.metres, found)
+        q[:] = found * self.metres
         return completeness
 
     def relaxed(self, by: float) -> Scaled:
@@ -169,11 +170,11 @@ class Scaled(WrappedForm):
 
     def value_at(self, T: Array, q: Array) -> float:
         """The redundancy parameter, if it is no joint's value."""
-        return self.form.value_at(self._target(T), q / self._metres)
+        return self.form.value_at(self._target(T), q / self.metres)
 
     def branch_of(self, q: Array) -> int:
         """The branch that a configuration ``(n,)`` is on."""
-        return self.form.branch_of(q / self._metres)
+        return self.form.branch_of(q / self.metres)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """Those of the form; a length counts as near if it is in the unit, singular values stay in it."""
@@ -181,7 +182,7 @@ class Scaled(WrappedForm):
             replace(
                 s,
                 distance=s.distance * (self.unit if s.unit == "m" else 1.0),
-                met_at=tuple(JointValue(i, value * float(self._metres[i])) for i, value in s.met_at),
+                met_at=tuple(JointValue(i, value * float(self.metres[i])) for i, value in s.met_at),
             )
-            for s in self.form.singularities(q / self._metres, within)
+            for s in self.form.singularities(q / self.metres, within)
         )

@@ -81,9 +81,12 @@ def _angle(z: Array, v: Array, w: Array) -> tuple[float, float]:
 def _slide(params: Array, T: Array, q: Array) -> bool:
     """q ``(6,)``, with the slides at zero ← their values that bring the point to that of T; False if none does."""
     J, P, axes, x = np.empty((6, 6)), np.empty((4, 4)), np.empty((6, 7)), np.empty(3)
+    directions = np.empty((3, 3))
     jacobian_into(params[MODEL:], q, J, P, axes)
     first, second, third = int(params[SLIDES]), int(params[SLIDES + 1]), int(params[SLIDES + 2])
-    a, b, c = J[:3, first], J[:3, second], J[:3, third]
+    for i in range(3):
+        directions[0, i], directions[1, i], directions[2, i] = J[i, first], J[i, second], J[i, third]
+    a, b, c = directions[0], directions[1], directions[2]
     volume = triple(a, b, c)
     if abs(volume) < _FLAT:
         return False

@@ -66,7 +66,13 @@ def match(robot: Robot, form_of: Match, family_of: Match) -> General5 | Point3 |
 
 
 class General5(ClosedForm):
-    """All solutions of an arm with three to five revolute joints that has no closed form of its own."""
+    """All solutions of an arm with three to five revolute joints that has no closed form of its own.
+
+    Attributes:
+        form: the solver of the arm that is completed to six joints.
+        point: whether it meets points only, as three joints do; each has two branches of `form`.
+        rolls: whether the virtual joint rolls the tool about its z axis.
+    """
 
     name, title = NAME, TITLE
     lengths = ()
@@ -74,19 +80,19 @@ class General5(ClosedForm):
 
     def __init__(self, robot: Robot, form: ClosedForm, axes: Axes) -> None:
         self.robot, self.form, self.off = robot, form, form.off
-        self._point, self._rolls = axes is BALL, axes is ROLL
+        self.point, self.rolls = axes is BALL, axes is ROLL
         rolls = bool(robot.revolute[-1]) and roll_sense(robot) != 0.0
-        self._last_rolls = not (self._point or self._rolls) and rolls
+        self._last_rolls = not (self.point or self.rolls) and rolls
         virtual = "a virtual joint" if len(axes) == 1 else f"{len(axes)} virtual joints"
         kind = "revolute joints" if robot.revolute.all() else "joints"
         self.reason = f"{robot.n} {kind} whose axes fit no closed form; with {virtual} at the tool: {form.name}"
         # Names belong to all solutions of the six joints; for a point, the last part is about the virtual joints.
         self.named = form.named and not self._last_rolls
-        if self._point:
+        if self.point:
             self.branches = tuple(name.rpartition(" · ")[0] for name in form.branches[::2])
             known = {part for name in self.branches for part in name.split(" · ")}
             self.meanings = tuple(meaning for meaning in form.meanings if meaning[0] in known)
-        elif self.named and self._rolls:
+        elif self.named and self.rolls:
             self.branches, self.meanings = form.branches, form.meanings
         else:
             self.named = False
@@ -96,8 +102,8 @@ class General5(ClosedForm):
     def handles(self, task: int) -> bool:
         """Poses; a direction with five joints, or if the last joint keeps it; a point with three joints."""
         if task == APPROACH:
-            return self._point or self._rolls or self._last_rolls
-        return task == POSE or (task == POSITION and self._point)
+            return self.point or self.rolls or self._last_rolls
+        return task == POSE or (task == POSITION and self.point)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """What a pose of the six joints leaves free, and a last joint that only rolls the tool."""
@@ -112,7 +118,7 @@ class General5(ClosedForm):
         p, n = problem, self.robot.n
         free_roll = p.task == APPROACH and self._last_rolls
         T, lower, upper = without_last(p) if free_roll else (p.T, p.lower, p.upper)
-        if self._point:
+        if self.point:
             T = T.copy()
             T[:3, :3] = _TURN
         virtual = np.zeros(6 - n)
@@ -141,7 +147,7 @@ class General5(ClosedForm):
             arcs.append(free_last(p, q))
             columns = np.column_stack([columns, q[:, -1]])
         obstacle = found.obstacle
-        if self._point:
+        if self.point:
             obstacle = None if exists.any() else Obstacle("point")
         return Candidates(q, columns, tuple(arcs), found.gap, obstacle, found.completeness)
 
@@ -149,10 +155,10 @@ class General5(ClosedForm):
         """The solution of the six joints, q ``(N, k, 6)``, that each row ``(N, b)`` takes; −1 for none."""
         there = ~np.isnan(q[:, :, 0])
         numbers = np.broadcast_to(np.arange(q.shape[1]), there.shape)
-        if self._point:
+        if self.point:
             first = np.where(there[:, ::2], numbers[:, ::2], numbers[:, 1::2])
             return np.where(there[:, ::2] | there[:, 1::2], first, -1)
-        if not self._rolls:
+        if not self.rolls:
             off = apart(q[:, :, self.robot.n :], np.zeros(6 - self.robot.n))
             there = there & (off < _AT_ZERO)
         return np.where(there, numbers, -1)
@@ -175,7 +181,7 @@ class General5(ClosedForm):
                 out[part] = np.where(rows[..., None] >= 0, q, math.nan)
 
         def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            if not self._rolls:
+            if not self.rolls:
                 many(params, T[None], np.array([value]), near, out[None])
                 return bool(np.isfinite(T).all())
             longer, rows = np.zeros(6), np.empty((len(out), 6))
@@ -189,7 +195,7 @@ class General5(ClosedForm):
     def _completed(self, form: BatchKernels, params: Array, T: Array, values: Array, near: Array) -> Array:
         """Solutions of the six joints ``(N, k, 6)``."""
         found = np.empty((len(T), len(self.form.branches), 6))
-        if self._point:
+        if self.point:
             T = T.copy()
             T[:, :3, :3] = _TURN
         form.many(params, T, values, near, found)
@@ -199,15 +205,15 @@ class General5(ClosedForm):
         """The row of q ``(n,)`` among all solutions of its pose."""
         if self.named:
             row = self.form.branch_of(np.append(q, np.zeros(6 - self.robot.n)))
-            return row // 2 if self._point else row
+            return row // 2 if self.point else row
         return super().branch_of(q)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The smallest singular value of the Jacobian of what the arm can control."""
         J = jacobian(self.robot, q)
-        if self._point:
+        if self.point:
             J = J[:3]
-        elif self._rolls:
+        elif self.rolls:
             J = np.vstack([J[:3], fk(self.robot, q)[:3, :2].T @ J[3:]])
         return those_within(within, by_jacobian(J, rank=self.robot.n))
 

@@ -150,6 +150,9 @@ class General6(ClosedForm):
 
     Rows are numbered, not named: there may be up to sixteen, the arm may pass from one to another without meeting
     a singularity, and their number changes from pose to pose.
+
+    Attributes:
+        reading: the order in which the kernels read the arm's joints.
     """
 
     name, title, branches = NAME, TITLE, BRANCHES
@@ -162,7 +165,7 @@ class General6(ClosedForm):
         self.robot = robot
         self.tool_on_axis = tool_on_axis
         self.kernels = reading.kernels(kernels)
-        self._reading, self._solve = reading, solve
+        self.reading, self._solve = reading, solve
         slides = int((~robot.revolute).sum())
         kind = ("revolute joints", "joints, one of which slides,", "joints, two of which slide,")[slides]
         self.reason = f"six {kind} whose axes fit no closed form: all real solutions by elimination"
@@ -221,8 +224,8 @@ class General6(ClosedForm):
 
     def _solve_all(self, T: Array, q: Array) -> int:
         """q ``(16, 6)`` ← the solutions that the kernels find, and what `solve_all` knows of them."""
-        known = int(self._solve(self.kernels.params, self._reading.target(T), q))
-        q[:, list(self._reading.order)] = q.copy()
+        known = int(self._solve(self.kernels.params, self.reading.target(T), q))
+        q[:, list(self.reading.order)] = q.copy()
         return known
 
     def _beside_curves(self, T: Array, near: Array, q: Array) -> Completeness:

@@ -72,8 +72,15 @@ def _is_beside(q: Array, start: Array, end: Array) -> bool:
     return bool(np.abs(to - share * along).max() < _SAME_START)
 
 
-class _Fold:
-    """Moves a rotation about the first or last joint's axis into the target."""
+class Fold:
+    """Moves a rotation about the first or last joint's axis into the target.
+
+    Attributes:
+        joint, last: that joint, and whether it is the last one.
+        others: the other joints.
+        axis, back: the frame of its axis, and the inverse ``(4, 4)``: in the tool's frame for the last joint, in
+            the base frame for the first.
+    """
 
     def __init__(self, robot: Robot, joint: int) -> None:
         lines = lines_of(robot, as_counted=True)
@@ -113,7 +120,13 @@ class _Fold:
 
 
 class General7(ClosedForm):
-    """All solutions of an arm with seven revolute joints for a given value of its last or first joint."""
+    """All solutions of an arm with seven revolute joints for a given value of its last or first joint.
+
+    Attributes:
+        given: that joint.
+        form: the solver of the other six.
+        fold: moves its rotation into their target.
+    """
 
     name, title = NAME, TITLE
     lengths = ()
@@ -125,8 +138,8 @@ class General7(ClosedForm):
             f"seven revolute joints whose axes fit no closed form; joint {joint + 1} is given ({form.name})"
         )
         self.branches = tuple(f"solution {i + 1}" for i in range(len(form.branches)))
-        self._fold = _Fold(robot, joint)
-        self.kernels = self._fold.kernels(form.kernels)
+        self.fold = Fold(robot, joint)
+        self.kernels = self.fold.kernels(form.kernels)
         self._roll = rolled.roll_sense(robot)
         self._parameter = RedundancyParameter(f"theta{joint + 1}", f"θ{joint + 1}", joint=joint)
 
@@ -208,8 +221,8 @@ class General7(ClosedForm):
 
     def _add_missing(self, problem: SolverInput, value: float, out: Array) -> Completeness:
         """Add to solutions ``(rows, 7)`` what the solver of six joints finds besides; how complete they are."""
-        others = self._fold.others
-        q, T = np.ascontiguousarray(out[:, others]), self._fold.targets(problem.T, np.array([value]))[0]
+        others = self.fold.others
+        q, T = np.ascontiguousarray(out[:, others]), self.fold.targets(problem.T, np.array([value]))[0]
         completeness = self.form.add_missing(T, problem.seed[others], q)
         out[:, others] = q
         out[:, self.given] = np.where(np.isnan(q[:, 0]), math.nan, value)

@@ -29,11 +29,11 @@ def answer(
     back = params[REVERSED] > 0.0
     given = 6 if back else 0
     seed, lower, upper = joints[0], joints[1], joints[2]
-    box, chosen, q = np.empty((3, 7)), np.empty(8), np.empty((8, 7))
-    order = -1 if back else 1
-    signed_box(
-        seed[::order], lower[::order], upper[::order], params[SIGN : SIGN + 7], params[OFFSET : OFFSET + 7], box
-    )
+    box, chosen, q, chain = np.empty((3, 7)), np.empty(8), np.empty((8, 7)), np.empty((3, 7))
+    for k in range(3):
+        for i in range(7):
+            chain[k, i] = joints[k, 6 - i if back else i]
+    signed_box(chain[0], chain[1], chain[2], params[SIGN : SIGN + 7], params[OFFSET : OFFSET + 7], box)
     low, high = lower[given], upper[given]
     count = 0
     if math.isnan(requested) or limited:

@@ -407,8 +407,6 @@ def test_export(client):
     response = client.get("/api/v1/robots/tx2-60/export?format=c-test")
     assert response.headers["content-disposition"] == 'attachment; filename="tx2_60_test.c"'
     assert '#include "tx2_60.c"' in response.text
-    refused = client.get("/api/v1/robots/gen3/export?format=c")
-    assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, "robot")
     assert client.get("/api/v1/robots/panda/export?format=dxf").status_code == 422
 
 

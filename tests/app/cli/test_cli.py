@@ -659,14 +659,16 @@ def test_code_writes_a_file_and_names_bad_input(capsys, tmp_path, monkeypatch):
     assert Path("planar2r.c").read_text(encoding="utf-8") == kin.generate("planar2r", closest=False)
     _, out, _ = run(capsys, "code", "planar2r", "--language", "d.ts", "--name", "arm", "-o", "-")
     assert "export default arm;" in out
-    for words, field in (
-        (("gen3",), "robot: got 'gen3'"),
-        (("planar2r", "-o", "missing/arm.c"), "--output: got 'missing/arm.c'"),
-        (("planar2r", "--name", "2r"), "name: got '2r'"),
-        (("planar2r", "--language", "fortran"), "invalid choice: 'fortran'"),
+    typed = kin.robot_to_toml("puma560").replace("90", "89.999").replace('id = "', 'id = "typed-')
+    Path("typed.toml").write_text(typed, encoding="utf-8")
+    for words, field, valid in (
+        (("typed.toml",), "robot: got 'typed-puma560'", "Write angles such as pi/2"),
+        (("planar2r", "-o", "missing/arm.c"), "--output: got 'missing/arm.c'", "a file that can be written"),
+        (("planar2r", "--name", "2r"), "name: got '2r'", "a letter, then at most 39 letters, digits and _"),
+        (("planar2r", "--language", "fortran"), "invalid choice: 'fortran'", "'c', 'js', 'mjs', 'd.ts', 'c-test'"),
     ):
         code, _, error = run(capsys, "code", *words)
-        assert (code, field in error) == (2, True)
+        assert (code, field in error, valid in error) == (2, True, True), error
 
 
 def test_files_of_code_have_the_names_by_which_they_include_each_other(capsys, tmp_path, monkeypatch):

@@ -491,6 +491,13 @@ def swapped(x, y, a):
     return p + 10.0 * q + 100.0 * r + 1000.0 * a[1]
 
 
+def arrays_swapped(x, y, a):
+    b, c = np.full(2, x), np.full(2, y)
+    for i in range(3):
+        b, c = c, b
+    return b[0] + 10.0 * c[1]
+
+
 def chained(x, y, a):
     p = q = a[0] = x + 1.0
     p += y
@@ -543,8 +550,8 @@ def library(x, y, a):
 RIGHT = (
     negative_index, floor_large, zero_of_whole_numbers, shift, powers, quotients, least_and_most, rounded, both_conditions,
     loop_variable, range_that_changes, slices, conditions, chosen, truth_in_sums, tables, signs_and_brackets,
-    bits_of_words, complex_numbers, arrays_of_all_kinds, swapped, chained, named_tuple, returned_array, passed_kernel,
-    whole_arrays, nested_calls, library, writers_in_order,
+    bits_of_words, complex_numbers, arrays_of_all_kinds, swapped, arrays_swapped, chained, named_tuple,
+    returned_array, passed_kernel, whole_arrays, nested_calls, library, writers_in_order,
 )  # fmt: skip
 for each in list(globals().values()):
     if callable(each) and getattr(each, "__module__", "") == __name__ and not isinstance(each, type):

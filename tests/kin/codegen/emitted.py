@@ -5,21 +5,24 @@ from __future__ import annotations
 import ctypes
 import math
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import kin
-from kin.codegen import families, files, source
+from kin.codegen import families, files, source, wrappers
 from kin.codegen.arm import Arm, arm_of
-from kin.codegen.types import FLOAT, INT
+from kin.codegen.types import FLOAT, INT, Constants
 from kin.differential.metric import weights
 from kin.ik.candidates import Requirement, Rows, measure_and_sort
 from kin.kernels import simd
 from kin.kernels.checks import straighten
+from kin.robot import Robot
 from kin.solvers.contract import POSE, SolverInput
+from kin.solvers.scaled import in_unit
+from kin.warmup import MADE_UP, made_up_arms
 
 STATUSES = ("solved", "approximate", "limits", "unmet", "orientation", "unreachable")
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
@@ -27,6 +30,29 @@ STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 EXACT = ("-mfma", "-ffp-contract=off", "-fno-tree-vectorize")
 BITS = {simd._bits: ("bits_of", (FLOAT,), INT), simd._float: ("float_of", (INT,), FLOAT)}
 OWN = {k: row for k, row in source.PRIMITIVES.items() if row[0] not in ("sin_cos", "arctan2")} | BITS
+
+
+def _made_up() -> dict[str, Robot]:
+    """Arms of families, and of arms solved as other ones, of which no built-in arm is one."""
+    right, rng = 0.5 * math.pi, np.random.default_rng(7)
+    wrist = [(0.0, 0.1, 0.0, -right), (0.0, 0.0, 0.0, right), (0.0, 0.1, 0.0, 0.0)]
+    twists, numbers = rng.choice([right, -right], 6), (rng.uniform(-3.0, 3.0, 6), rng.uniform(-0.5, 0.5, (6, 2)))
+    table = np.column_stack([*numbers, twists]).tolist()
+    found = dict(zip(MADE_UP, made_up_arms(), strict=True))
+    found["four"] = Robot.from_dh([(0.3 * i, 0.1 + 0.1 * i, 0.3 - 0.05 * i, 0.7 + 0.1 * i) for i in range(4)])
+    found["small"] = in_unit(kin.get_robot("stanford"), 64.0)
+    lift = {"kind": "prismatic"}
+    found["order"] = Robot.from_dh([(0.0, 0.3, 0.0, 0.0), lift | {"a": 0.3}, (0.0, 0.0, 0.25, 0.0), *wrist])
+    found["tool to base"] = Robot.from_dh(
+        [
+            dict(zip(("theta", "d", "a", "alpha"), row, strict=True)) | (lift if i in (1, 3) else {})
+            for i, row in enumerate(table)
+        ]
+    )
+    return {name: replace(robot, id=f"made-up-{name}") for name, robot in found.items()}
+
+
+ROBOTS = kin.builtin_robots() | {robot.id: robot for robot in _made_up().values()}
 
 
 @dataclass
@@ -130,11 +156,14 @@ def _harden(q, kind, rng, robot, limits):
 def answer(arm: Arm, T, seed, value):
     """What the core's kernels find: joint values and statistics of the solutions, the nearest first."""
     robot, form = arm.robot, arm.form
-    pose = np.empty((4, 4))
+    pose, q, alone = np.empty((4, 4)), np.empty((arm.rows, robot.n)), arm.alone
     assert straighten(np.ascontiguousarray(T), 1e6, pose) >= 0.0
-    if arm.alone.rows in (families.without_limits, families.of_general6):
-        q = np.empty((arm.rows, robot.n))
+    rows = alone.inner.rows if alone.rows is wrappers.of_counted else alone.rows
+    if rows in (families.without_limits, families.of_general6):
         form.kernels.one(form.kernels.params, pose, value, seed, q)
+    elif isinstance(alone.inner, Constants) and rows is alone.rows:  # Python computes sums of products otherwise
+        limits, arcs = (robot.lower, robot.upper), np.empty((256, 3))
+        alone.rows(alone.inner, alone.params, pose, value, seed, limits, arcs, q)
     else:
         values = (value,) * len(form.redundancies(POSE))
         q = np.array(

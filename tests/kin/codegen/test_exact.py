@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emitted import STRICT, answer, exact, targets
+from emitted import ROBOTS, STRICT, answer, exact, targets
 from numba import types
 
-import kin
 from kin.codegen import files
 from kin.codegen.arm import arm_of
 from kin.codegen.families import alone, without_limits
@@ -22,27 +21,15 @@ from kin.solvers.contract import POSE
 from kin.warmup import one_of_each_family
 
 QUICK = ("irb120", "pioneer5")
-ALL = [
-    pytest.param(robot.id, marks=() if robot.id in QUICK else pytest.mark.full)
-    for robot in kin.builtin_robots().values()
-]
+ALL = [pytest.param(robot_id, marks=() if robot_id in QUICK else pytest.mark.full) for robot_id in ROBOTS]
 HAS_FMA = Path("/proc/cpuinfo").exists() and " fma " in Path("/proc/cpuinfo").read_text()
-
-
-def emitted_or_skip(robot_id):
-    """The arm, unless it is refused: which ones are, and in which words, is tested elsewhere."""
-    robot = kin.get_robot(robot_id)
-    try:
-        return robot, arm_of(robot)
-    except kin.InputError:
-        pytest.skip("refused")
 
 
 @pytest.mark.skipif(not HAS_FMA, reason="numba uses fused operations only where the processor has them")
 @pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
 @pytest.mark.parametrize("robot_id", ALL)
 def test_c_computes_the_bits_of_the_compiled_kernels(robot_id, tmp_path):
-    robot, _ = emitted_or_skip(robot_id)
+    robot = ROBOTS[robot_id]
     random, hard, level = (60, 48, "-O0") if robot_id in QUICK else (1000, 300, "-O2")
     built = exact(robot, tmp_path, level)
     solved = 0
@@ -60,11 +47,37 @@ def test_c_computes_the_bits_of_the_compiled_kernels(robot_id, tmp_path):
     assert solved > random // 2
 
 
+ADAPTERS = [
+    pytest.param(robot_id, marks=() if robot_id in ("rrp", "palletiser", "made-up-turned3") else pytest.mark.full)
+    for robot_id in ROBOTS
+]
+
+
+@pytest.mark.parametrize("robot_id", ADAPTERS)
+def test_an_adapter_finds_what_the_solver_finds(robot_id):
+    robot = ROBOTS[robot_id]
+    form = closed_form_of(robot)
+    found = alone(robot, form)
+    limits, arcs, kernels = (robot.lower, robot.upper), np.empty((256, 3)), form.kernels
+    for T, seed, goal in zip(*targets(robot, 20, 0), strict=True):
+        value = float(goal[form.redundancies(POSE)[0].joint]) if found.needs_value else math.nan
+        q, expected = np.empty((2, len(form.branches), robot.n))
+        found.rows(found.inner, found.params, T, value, seed, limits, arcs, q)
+        kernels.one(kernels.params, T, value, seed, expected)
+        assert np.isfinite(q).any()
+        if found.needs_value or not form.redundancies(POSE):
+            q, expected = (rows[~np.isnan(rows[:, 0])] for rows in (q, expected))
+            off = q[:, None] - expected
+            off = np.where(robot.revolute, (off + math.pi) % (2.0 * math.pi) - math.pi, off)
+            assert len(q) == len(expected)
+            assert np.abs(off).max(axis=2).min(axis=0).max() < 1e-7
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("robot_id", ALL)
 def test_c_is_also_strict_cpp_and_clean_under_sanitizers(robot_id, tmp_path):
-    robot, arm = emitted_or_skip(robot_id)
-    name = files.name_for(robot, None)
+    robot = ROBOTS[robot_id]
+    arm, name = arm_of(robot), files.name_for(robot, None)
     text = files.c_file(arm, name)
     define = f"-D{name.upper()}_IMPLEMENTATION"
     plus = tmp_path / "arm.cpp"
@@ -140,7 +153,7 @@ def unnamed(kind):
 @pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
 @pytest.mark.parametrize("robot_id", ALL)
 def test_results_have_the_types_that_numba_infers(robot_id):
-    _, arm = emitted_or_skip(robot_id)
+    arm = arm_of(ROBOTS[robot_id])
     compared = 0
     for made in arm.program.instances:
         kernel = getattr(__import__(made.function.__module__, fromlist=["_"]), made.function.__name__)
