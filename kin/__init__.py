@@ -10,7 +10,7 @@ What most programs need is here, everything else in the package that it is about
 
 from typing import TYPE_CHECKING
 
-from kin import collision, comparison, dh, doctor, files, ik, motion, motors, path, workspace
+from kin import calibration, collision, comparison, dh, doctor, files, ik, motion, motors, path, workspace
 from kin._version import __version__
 from kin.collision import Obstacle, clearance
 from kin.comparison import compare
@@ -74,6 +74,7 @@ __all__ = [
     "branch_names",
     "branch_of",
     "builtin_robots",
+    "calibration",
     "clearance",
     "collision",
     "compare",

@@ -36,6 +36,8 @@ import numpy as np
 from kin.errors import InputError, finite_number, one_of
 from kin.transforms import Array
 
+Matrix = tuple[tuple[float, ...], ...]
+IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 Kind = Literal["revolute", "prismatic", "fixed"]
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
 FOLLOWS = 2.0  # added to the code of a row that follows a joint
@@ -128,6 +130,14 @@ class Joint:
     def driven(self) -> bool:
         """Whether it is a joint: it moves, and by itself."""
         return self.kind != "fixed" and not self.follows
+
+
+@dataclass(frozen=True)
+class NominalTable:
+    """The table of an arm before it was calibrated: all rows, and the transform after the last one."""
+
+    rows: tuple[Joint, ...]
+    tool: Matrix = IDENTITY
 
 
 def check_followers(rows: Sequence[Joint]) -> None:

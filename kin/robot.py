@@ -37,10 +37,13 @@ from kin.joint import (
     map_of,
     stroke_of,
 )
+from kin.joint import IDENTITY as IDENTITY
 from kin.joint import KIND_CODES as KIND_CODES
 from kin.joint import PEAK_FIELDS as PEAK_FIELDS
 from kin.joint import Joint as Joint
 from kin.joint import Kind as Kind
+from kin.joint import Matrix as Matrix
+from kin.joint import NominalTable as NominalTable
 from kin.motor import Motor, checked_motors
 from kin.transforms import Array, as_transform, finite_array
 from kin.units import METRES
@@ -50,9 +53,7 @@ Mounting = Literal["pedestal", "floor", "table", "wall", "ceiling"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 MOUNTINGS: tuple[Mounting, ...] = get_args(Mounting)
 LENGTHS = METRES
-Matrix = tuple[tuple[float, ...], ...]
 _ROUNDING = 1e-14  # a rotation further from orthonormal than this is made orthonormal
-IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,8 @@ class Robot:
             that names no joint counts for nothing, for the same reason.
         ros_joints: by the names of joints, what the published description for ROS calls them; the others have the
             same name there.
+        nominal: the table from which the arm was calibrated, None for a nominal one. It decides which links are
+            compared and how branches are called.
 
     Raises:
         InputError: an unknown convention, unit or mounting, no moving joint, a row that follows what is no joint
@@ -125,6 +128,7 @@ class Robot:
     motors: tuple[Motor, ...] = ()
     pendant: tuple[Shown, ...] = ()
     ros_joints: tuple[tuple[str, str], ...] = ()
+    nominal: NominalTable | None = None
 
     def __repr__(self) -> str:
         """Id, name and joints in one line; `kin.robot_to_toml` writes out the table."""
@@ -163,12 +167,10 @@ class Robot:
         if self.pendant:
             _ = self.pendant_map
         for key in ("base", "tool"):
-            T = getattr(self, key)
-            if T is not IDENTITY:
-                clean = as_transform(T, key)
-                if np.abs(clean - np.asarray(T)).max() > _ROUNDING:
-                    T = clean
-                object.__setattr__(self, key, tuple(tuple(map(float, row)) for row in T))
+            object.__setattr__(self, key, _nested(getattr(self, key), key))
+        if self.nominal is not None:
+            nominal = NominalTable(tuple(self.nominal.rows), _nested(self.nominal.tool, "nominal.tool"))
+            object.__setattr__(self, "nominal", nominal)
 
     @classmethod
     def from_dh(
@@ -250,7 +252,12 @@ class Robot:
             >>> kin.fk(arm, [0.0, 0.0])[:3, 3]
             array([1.7, 0. , 0. ])
         """
-        return replace(self, tool=as_transform(T_last_tool, "T_last_tool"))  # type: ignore[arg-type]
+        tool: Any = as_transform(T_last_tool, "T_last_tool")
+        nominal = self.nominal
+        if nominal is not None:
+            moved: Any = np.asarray(nominal.tool) @ np.linalg.solve(self.T_last_tool, tool)
+            nominal = replace(nominal, tool=moved)
+        return replace(self, tool=tool, nominal=nominal)
 
     def with_mounted(self, T_tool_mounted: ArrayLike) -> Robot:
         """The same arm with a further tool on its tool, as the field `tool` of REST requests mounts one.
@@ -354,6 +361,20 @@ class Robot:
             array([ 0. ,  0.1, -0.1,  0.3, -0.3,  0.5])
         """
         return q if not self.coupled else np.asarray(q) @ self.expansion.T
+
+    @cached_property
+    def nominal_arm(self) -> Robot | None:
+        """The arm with its nominal table and the same bodies; None where there is none, or its rows are others."""
+        if self.nominal is None:
+            return None
+        places = {row.name: i for i, row in enumerate(self.nominal.rows)}
+        tables = (self.rows, self.nominal.rows)
+        own, nominal = ([(row.name, row.kind, row.follows) for row in rows if row.moves] for rows in tables)
+        at = [places.get(self.rows[each.row].name, -2) if each.row >= 0 else -1 for each in self.capsules]
+        if own != nominal or -2 in at:
+            return None
+        capsules = tuple(replace(each, row=row) for each, row in zip(self.capsules, at, strict=True))
+        return replace(self, rows=self.nominal.rows, tool=self.nominal.tool, capsules=capsules, nominal=None)
 
     @cached_property
     def leads(self) -> NDArray[np.bool_]:
@@ -526,6 +547,15 @@ class Robot:
         lower = np.where(np.isfinite(self.lower), self.lower, -math.pi)
         upper = np.where(np.isfinite(self.upper), self.upper, math.pi)
         return rng.uniform(lower, upper, (*shape, self.n))
+
+
+def _nested(T: Matrix, field: str) -> Matrix:
+    """A rigid transform as nested tuples; its rotation is made orthonormal if it is far from that."""
+    if T is IDENTITY:
+        return T
+    clean = as_transform(T, field)
+    rows: Iterable[Iterable[float]] = clean if np.abs(clean - np.asarray(T)).max() > _ROUNDING else T
+    return tuple(tuple(map(float, row)) for row in rows)
 
 
 def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:

@@ -34,6 +34,7 @@ RULES: dict[str, set[str]] = {
     "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
     # Only `kin.generate`, when it is called, imports it: no service does.
     "kin/codegen": {"numpy", "kin._version", "kin.codegen", "kin.ik", "kin.kernels", "kin.solvers", *MODEL},
+    "kin/calibration": {"numpy", "kin.calibration", "kin.collision", "kin.ik", *MODEL},
     "kin/comparison": {"numpy", "kin.comparison", "kin.dh", *MODEL},
     "kin/differential": {"numpy", "kin.axes", "kin.differential", "kin.fk", "kin.robot", "kin.transforms"},
     "kin/files": {

@@ -1,4 +1,4 @@
-"""``kinboard import``, ``export``, ``code`` and ``check``: files of arms, exercises, courses and lessons.
+"""``kinboard import``, ``export``, ``code``, ``check`` and ``doctor``: files of arms, exercises, courses, lessons.
 
 A file that is not a valid robot is rejected earlier, by :mod:`kin.files`.
 """
@@ -12,7 +12,7 @@ from collections import Counter
 from pathlib import Path
 
 import kin
-from app.cli.bodies import MeshesBeside
+from app.cli.bodies import MeshesBeside, MeshFilesBeside
 from app.cli.classroom.courses import check_course
 from app.cli.terminal import Notation, print_json, robot_of, table
 from app.cli.xacro import expanded, is_xacro
@@ -20,10 +20,13 @@ from app.exercises import Exercise, ExerciseFileError, VariantError, load_exerci
 from app.exercises.exercise import CHECKED_SEEDS
 from app.exercises.lesson_text import load_lesson
 from app.exports.robots import file_name, robot_file
+from app.shared.answers.examination import TITLES, examination_answer, outcome
 from app.shared.answers.exchange import import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
 from app.shared.store import Store
 from kin import InputError, builtin_robots, load_robot, robot_to_toml
+from kin.doctor import UrdfExamination, examine_urdf
+from kin.doctor.findings import RANKS
 from kin.files import UrdfReport, UrdfRobot, read_urdf
 from kin.files.builtin import BUILTIN
 from kin.units import DEFAULT_UNITS
@@ -241,3 +244,57 @@ def _exercise_facts(exercise: Exercise) -> dict[str, object]:
         "text": variant.text(exercise.text, DEFAULT_UNITS),
         "answer": exercise.solution(variant, DEFAULT_UNITS),
     }
+
+
+def run_doctor(arguments: Namespace) -> int:
+    """Examine a URDF; the exit code is 1 if something is wrong or suspicious."""
+    path = Path(arguments.file)
+    source, files = source_of(arguments), MeshFilesBeside(path)
+
+    def examined(mends: list[int] | None) -> UrdfExamination:
+        return examine_urdf(source, arguments.base, arguments.tip, file=str(path), files=files, mends=mends)
+
+    found = examined(None)
+    if arguments.mend is not None:
+        found = examined(_chosen(found, arguments.mend))
+    if arguments.output is not None and found.mended is not None:
+        write_file(arguments.output, found.mended)
+    if arguments.json:
+        print_json(examination_answer(found))
+    else:
+        print("\n".join(_examination_lines(found, arguments.output)))
+    return 1 if found.count("wrong") or found.count("suspicious") else 0
+
+
+def _chosen(found: UrdfExamination, numbers: list[int]) -> list[int]:
+    """The indices of findings by their numbers; raises `InputError` for one that cannot be mended."""
+    valid = [number for number, each in enumerate(found.findings, 1) if each.automatic]
+    for number in numbers:
+        if number not in valid:
+            raise InputError(
+                "--mend", number, f"numbers of the report: {', '.join(map(str, valid)) or 'it has none'}"
+            )
+    return [number - 1 for number in numbers]
+
+
+def _examination_lines(found: UrdfExamination, output: str | None) -> list[str]:
+    lines = [found.file, *found.read]
+    if found.refusal:
+        lines.append(f"No arm is read: {found.refusal}.")
+    for rank in RANKS:
+        several = [(number, each) for number, each in enumerate(found.findings, 1) if each.rank == rank]
+        lines += ["", TITLES[rank]] if several else []
+        for number, each in several:
+            where = f"line {each.line}" if each.line else "file"
+            lines.append(f"  {where}, {each.place}: {each.text}")
+            if each.automatic:
+                lines.append(f"    {'mended' if each.done else 'left'} ({number}): {each.mend}")
+            elif each.mend:
+                lines.append(f"    advice: {each.mend}")
+    lines += ["", outcome(found)]
+    if found.mended is not None:
+        how = f"{output} has it mended." if output else "-o FILE writes it mended."
+        lines[-1] += f" {how}"
+    elif output is not None:
+        lines[-1] += f" There is nothing to mend: {output} is not written."
+    return lines

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 from app.cli import arguments as declare
+from app.cli.arguments.calibrate import add_calibrate
 from app.cli.arguments.shared import Parents
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
@@ -240,10 +241,16 @@ def _load_motors() -> Run:
     return run_motors
 
 
-def _load_doctor() -> Run:
-    from app.cli.doctor import run
+def _load_calibrate() -> Run:
+    from app.cli.calibrate import run
 
     return run
+
+
+def _load_doctor() -> Run:
+    from app.cli.files import run_doctor
+
+    return run_doctor
 
 
 def _load_move() -> Run:
@@ -342,6 +349,7 @@ COMMANDS = (
     Command("check", declare.add_check, _load_check, interpreted=True),
     Command("compare", declare.add_compare, _load_compare, interpreted=True),
     Command("motors", declare.add_motors, _load_motors, interpreted=True),
+    Command("calibrate", add_calibrate, _load_calibrate),
     Command("doctor", declare.add_doctor, _load_doctor, interpreted=True),
     Command("capability", declare.add_capability, _load_capability),
     Command("import", declare.add_import, _load_import, interpreted=True),

@@ -14,7 +14,7 @@ configuration, the others are compared unless they overlap as little. Against ob
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -77,6 +77,8 @@ def bodies_of(robot: Robot, home_is_free: bool = True) -> Bodies:
     Args:
         home_is_free: whether links that touch at the home configuration are not compared.
     """
+    if (nominal := robot.nominal_arm) is not None:
+        return _moved(bodies_of(nominal, home_is_free), nominal, robot)
     found = _with_tool(robot) if robot.capsules else _assumed(robot)
     rows = np.array([each.row for each in found], np.int64)
     shape = np.array(
@@ -100,6 +102,14 @@ def bodies_of(robot: Robot, home_is_free: bool = True) -> Bodies:
         least_distance(robot.model, rows, shape, pairs[:0], np.ascontiguousarray(each), at, np.empty(7))
     moving = np.flatnonzero(np.ptp(ends, axis=0).max(axis=1, initial=0.0) > _STILL)
     return Bodies(found, rows, shape, np.ascontiguousarray(pairs[kept]), moving.astype(np.int64))
+
+
+def _moved(bodies: Bodies, nominal: Robot, robot: Robot) -> Bodies:
+    """The bodies of a nominal arm in the frames of the calibrated one."""
+    places = {row.name: i for i, row in enumerate(robot.rows)}
+    own = [places.get(row.name, -1) for row in nominal.rows]
+    found = tuple(replace(each, row=own[each.row] if each.row >= 0 else -1) for each in bodies.capsules)
+    return replace(bodies, capsules=found, rows=np.array([each.row for each in found], np.int64))
 
 
 def _compared(

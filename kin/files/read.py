@@ -30,6 +30,7 @@ from kin.robot import (
     Capsule,
     Joint,
     Matrix,
+    NominalTable,
     Robot,
 )
 from kin.transforms import as_transform
@@ -44,7 +45,7 @@ MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
     *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor", "motors", "pendant"),
-    "ros_joints",
+    *("ros_joints", "nominal"),
 }
 _CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _MOTOR = {
@@ -190,17 +191,8 @@ class Reader:
         self.length = LENGTHS[length]
         self.angle = ANGLES[self.choice(units, "angle", tuple(ANGLES), "units.")]
         convention = self.choice(data, "convention", CONVENTIONS)
-        raw_rows = data.get("rows")
-        if not isinstance(raw_rows, list) or not 1 <= len(raw_rows) <= MAX_ROWS:
-            raise self.refuse("rows", raw_rows, f"1 to {MAX_ROWS} [[rows]] tables, one per DH row")
-        rows = tuple(self.row(i, row) for i, row in enumerate(raw_rows))
-        if not any(row.driven for row in rows):
-            raise self.refuse("rows", "no row that moves by itself", "at least one revolute or prismatic row")
-        names = [row.name for row in rows]
-        for name in names:
-            if names.count(name) > 1:
-                raise self.refuse("rows[].name", name, "a different name for each row")
-        joints = self.joints(rows, raw_rows)
+        rows = self.rows(data)
+        joints = self.joints(rows, data["rows"])
         robot = Robot(
             id=robot_id,
             name=self.text(data, "name"),
@@ -222,12 +214,41 @@ class Reader:
             motors=self.motors(data, joints),
             pendant=self.pendant(data, joints),
             ros_joints=self.ros_joints(data, joints),
+            nominal=self.nominal(data, rows),
         )
         if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
             raise self.refuse(
                 "rows", f"a reach of {robot.reach:g} m", f"at most {MAX_REACH:g} m with base and tool"
             )
         return robot if "home" in data else replace(robot, home=default_home(robot))
+
+    def rows(self, data: dict[str, Any], within: str = "") -> tuple[Joint, ...]:
+        """The rows of a table."""
+        raw_rows = data.get("rows")
+        if not isinstance(raw_rows, list) or not 1 <= len(raw_rows) <= MAX_ROWS:
+            raise self.refuse(f"{within}rows", raw_rows, f"1 to {MAX_ROWS} [[rows]] tables, one per DH row")
+        rows = tuple(self.row(i, row, within) for i, row in enumerate(raw_rows))
+        if not any(row.driven for row in rows):
+            expected = "at least one revolute or prismatic row"
+            raise self.refuse(f"{within}rows", "no row that moves by itself", expected)
+        names = [row.name for row in rows]
+        for name in names:
+            if names.count(name) > 1:
+                raise self.refuse(f"{within}rows[].name", name, "a different name for each row")
+        return rows
+
+    def nominal(self, data: dict[str, Any], rows: Sequence[Joint]) -> NominalTable | None:
+        """The table from which an arm was calibrated."""
+        if "nominal" not in data:
+            return None
+        table = self.table(data, "nominal", "rows and tool")
+        self.only_known_fields("nominal.", table, {"rows", "tool"})
+        found = self.rows(table, "nominal.")
+        moving, own = ([(row.name, row.kind, row.follows) for row in each if row.moves] for each in (found, rows))
+        if moving != own:
+            names = ", ".join(row.name for row in rows if row.moves)
+            raise self.refuse("nominal.rows", [name for name, *_ in moving], f"the rows that move: {names}")
+        return NominalTable(found, self.transform(table, "tool", "nominal."))
 
     def joints(self, rows: Sequence[Joint], given: Sequence[Any]) -> tuple[Joint, ...]:
         """The rows that move by themselves, with what the rows that follow them leave of their limits."""
@@ -239,10 +260,10 @@ class Reader:
             index = [row.name for row in rows].index(name)
             raise self.refuse(f"rows[{index}].{key}", given[index].get(key), error.expected) from None
 
-    def row(self, index: int, data: object) -> Joint:
-        where = f"rows[{index}]."
+    def row(self, index: int, data: object, within: str = "") -> Joint:
+        where = f"{within}rows[{index}]."
         if not isinstance(data, dict):
-            raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
+            raise self.refuse(where[:-1], data, "a table with theta, d, a, alpha")
         self.only_known_fields(where, data, _ROW)
         kind = self.choice(data, "kind", tuple(KIND_CODES), where, default="revolute")
         for key in ("limits", "follows", "sign", *PEAK_FIELDS):
@@ -459,17 +480,20 @@ class Reader:
         x, y, z = (self.length_of(f"{where}[{k}]", v) for k, v in enumerate(self.items(value, where, 3)))
         return x, y, z
 
-    def transform(self, data: dict[str, Any], key: str) -> Matrix:
+    def transform(self, data: dict[str, Any], key: str, within: str = "") -> Matrix:
         if key not in data:
             return IDENTITY
-        table = self.table(data, key, "xyz and rpy, or matrix")
-        self.only_known_fields(key + ".", table, {"matrix"} if "matrix" in table else {"xyz", "rpy"})
-        if "matrix" in table:
-            return self.matrix(table["matrix"], key + ".matrix")
-        xyz, rpy = (self.items(table.get(part, [0, 0, 0]), f"{key}.{part}", 3) for part in ("xyz", "rpy"))
+        where = f"{within}{key}."
+        given = data[key]
+        if not isinstance(given, dict):
+            raise self.refuse(where[:-1], given, f"a table [{where[:-1]}] with xyz and rpy, or matrix")
+        self.only_known_fields(where, given, {"matrix"} if "matrix" in given else {"xyz", "rpy"})
+        if "matrix" in given:
+            return self.matrix(given["matrix"], where + "matrix")
+        xyz, rpy = (self.items(given.get(part, [0, 0, 0]), where + part, 3) for part in ("xyz", "rpy"))
         return matrix_of(
-            [self.length_of(f"{key}.xyz[{i}]", v) for i, v in enumerate(xyz)],
-            [self.angle_of(f"{key}.rpy[{i}]", v) for i, v in enumerate(rpy)],
+            [self.length_of(f"{where}xyz[{i}]", v) for i, v in enumerate(xyz)],
+            [self.angle_of(f"{where}rpy[{i}]", v) for i, v in enumerate(rpy)],
         )
 
     def matrix(self, value: object, where: str) -> Matrix:

@@ -152,6 +152,10 @@ class _Writer:
             if robot.capsules_source:
                 data["capsules_source"] = robot.capsules_source
             data["capsules"] = [self.capsule(robot, each) for each in robot.capsules]
+        if robot.nominal is not None and robot.nominal_arm is not None:
+            data["nominal"] = {"rows": [self.row(row) for row in robot.nominal.rows]}
+            if robot.nominal.tool != IDENTITY:
+                data["nominal"]["tool"] = self.transform(robot.nominal.tool)
         return data
 
     @staticmethod

@@ -28,7 +28,7 @@ from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
 from kin.named import robot_of
 from kin.robot import Robot
-from kin.solvers import closed_form_of
+from kin.solvers.locked import named_form_of
 from kin.solvers.singular import Singularity
 
 __all__ = [
@@ -146,7 +146,7 @@ def branch_names(robot: Robot | str) -> tuple[str, ...]:
         >>> kin.branch_names("planar2r")
         ('elbow positive', 'elbow negative')
     """
-    closed_form = closed_form_of(robot_of(robot))
+    closed_form = named_form_of(robot_of(robot))
     return closed_form.branches if closed_form is not None and closed_form.named else ()
 
 
@@ -167,7 +167,7 @@ def branch_meanings(robot: Robot | str) -> dict[str, str]:
         >>> sorted(kin.ik.branch_meanings("planar2r"))
         ['elbow negative', 'elbow positive']
     """
-    closed_form = closed_form_of(robot_of(robot))
+    closed_form = named_form_of(robot_of(robot))
     return {} if closed_form is None else dict(closed_form.meanings)
 
 
@@ -190,7 +190,7 @@ def branch_of(robot: Robot | str, q: ArrayLike) -> str:
         'elbow positive'
     """
     robot = robot_of(robot)
-    closed_form = closed_form_of(robot)
+    closed_form = named_form_of(robot)
     if closed_form is None or not closed_form.named:
         raise InputError("robot", robot.id, "an arm whose branches have names")
     values = robot.check_q(q)

@@ -31,8 +31,8 @@ from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
-from kin.solvers import closed_form_of
 from kin.solvers.contract import APPROACH, Candidates, ClosedForm, Many, One
+from kin.solvers.locked import named_form_of
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
@@ -332,7 +332,7 @@ def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = m
 
 
 def _prepare(robot: Robot) -> _Prepared:
-    match = closed_form_of(robot)
+    match = named_form_of(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
     kernels, shape = match.kernels.unchecked(), (len(match.branches), robot.n)

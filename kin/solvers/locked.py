@@ -48,7 +48,7 @@ _SINGLE = 1e-6  # rad; the most that rounding makes of a single value
 @lru_cache(maxsize=256)
 def form_with_locked(robot: Robot, locked: Locks | None, task: int = POSE) -> ClosedForm | None:
     """The solver of an arm with locked joints: that of the whole arm unless they leave no redundancy parameter."""
-    form = closed_form_of(robot)
+    form = named_form_of(robot)
     values = {i: value for i, value in enumerate(locked or ()) if value is not None}
     if not values or robot.n - len(values) != 6 or not _determined(robot, values, task):
         return form
@@ -61,6 +61,16 @@ def form_with_locked(robot: Robot, locked: Locks | None, task: int = POSE) -> Cl
             return SingleValues(form, joint, value)
     inner = closed_form_of(fixed(robot, values))
     return form if inner is None else LockedJoints(robot, form, inner, values)
+
+
+@lru_cache(maxsize=256)
+def named_form_of(robot: Robot) -> ClosedForm | None:
+    """The solver of an arm; postures of a calibrated one are called as they would be in its nominal table."""
+    form, nominal = closed_form_of(robot), robot.nominal_arm
+    if form is None or form.named or nominal is None:
+        return form
+    names = closed_form_of(nominal)
+    return form if names is None or not names.named else LockedJoints(robot, names, form, {})
 
 
 def _determined(robot: Robot, values: dict[int, float], task: int) -> bool:
@@ -154,7 +164,9 @@ class LockedJoints(ClosedForm):
         self.name, self.title, self.lengths, self.off = inner.name, inner.title, inner.lengths, inner.off
         self.kernels = kernels_by_solving(self, inner.kernels)
         numbers = ", ".join(str(i + 1) for i in values)
-        self.reason = f"joint{'s' * (len(values) > 1)} {numbers} locked: {inner.reason}"
+        locked = f"joint{'s' * (len(values) > 1)} {numbers} locked: " if values else ""
+        self.reason = locked + inner.reason
+        self.steady, self.exact_ranges = inner.steady, inner.exact_ranges
         self.named = inner.named
         self.branches, self.meanings = inner.branches, inner.meanings
         self._names = form if form is not None and form.named else None

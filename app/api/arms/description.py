@@ -108,6 +108,13 @@ _ROW: dict[str, Any] = {
         "effort": {"description": "Largest torque or force in N·m or N.", **_number(["m"]), "exclusiveMinimum": 0},
     },
 }
+_ROWS: dict[str, Any] = {
+    "type": "array",
+    "minItems": 1,
+    "maxItems": MAX_ROWS,
+    "items": _ROW,
+    "description": "The DH rows from base to tool; at least one moves.",
+}
 _POINT = _items(_quantity(_LENGTH, "A length."), 3, "A point in the frame of the row, in the length unit.")
 _CAPSULE: dict[str, Any] = {
     "type": "object",
@@ -192,13 +199,7 @@ _SCHEMA: dict[str, Any] = {
                 "angle": {"enum": ["deg", "rad"], "description": "Unit of angles."},
             },
         },
-        "rows": {
-            "type": "array",
-            "minItems": 1,
-            "maxItems": MAX_ROWS,
-            "items": _ROW,
-            "description": "The DH rows from base to tool; at least one moves.",
-        },
+        "rows": _ROWS,
         "home": {
             "type": "object",
             "additionalProperties": False,
@@ -233,6 +234,14 @@ _SCHEMA: dict[str, Any] = {
         },
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
+        "nominal": {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["rows"],
+            "properties": {"rows": _ROWS, "tool": _TRANSFORM},
+            "description": "The table from which the arm was calibrated, with the same rows that move: it "
+            "decides which links are compared, and names postures.",
+        },
     },
 }
 

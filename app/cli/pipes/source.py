@@ -135,6 +135,18 @@ class Source:
             for lines in self._lines():
                 yield [_goal(place, partial(self._line, place, line, maker)) for place, line in lines]
 
+    def numbers(self, names: Sequence[str]) -> list[tuple[str, list[float]]]:
+        """The rows of a table with these columns among others, or nothing but these numbers; each with its place.
+
+        Raises:
+            InputError: no table, or a row without numbers in these columns.
+        """
+        if self.form != "csv":
+            raise InputError(
+                self.field, self.form, "a table (CSV or Parquet) with the columns " + ", ".join(names)
+            )
+        return [(place, read()) for rows in self._table(names) for place, read in rows]
+
     def objects(self) -> Iterator[tuple[str, dict[str, Any]]]:
         """The objects of JSON lines, one by one, each with its place."""
         for lines in self._lines():

@@ -179,7 +179,7 @@ def _odd_axes(robot: Robot, between: tuple[Pair, ...]) -> list[str]:
         here, there = pair.joint + 1, pair.joint + 2
         if pair.one_line:
             found.append(f"Joints {here} and {there} turn about the same line: only their sum moves the tool.")
-        elif pair.almost:
+        elif pair.almost and robot.nominal is None:  # a measured table is meant as it is
             found.append(
                 f"The axes of joints {here} and {there} are almost {pair.almost}: if they should be so exactly, "
                 "give the table with more digits."

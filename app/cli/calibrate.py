@@ -1,0 +1,176 @@
+"""``kinboard calibrate``: postures to touch in, and the table of an arm from what its joints read in touches."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from argparse import Namespace
+from dataclasses import replace
+
+import numpy as np
+
+from app.cli.files import write_file
+from app.cli.pipes.source import opened_source
+from app.cli.terminal import Notation, mounted_robot_of, pose_of, print_json, quantity, table, units_of
+from app.exports.touch import report, sheet_svg
+from app.shared.answers.calibration import calibration_answer, touch_plan_answer
+from kin import InputError, Robot, robot_to_toml
+from kin.calibration import (
+    Calibration,
+    TableTolerances,
+    TouchBoard,
+    TouchFixture,
+    TouchNoise,
+    TouchPlan,
+    calibrate,
+    touch_postures,
+)
+from kin.calibration.words import millimetres
+from kin.transforms import Array
+
+PRINTED, WAVE = 0.005, math.radians(0.5)
+TOUCHES = 20
+
+
+def run(arguments: Namespace) -> int:
+    """Propose touches, or fit the table; the exit code is 1 if touches contradict each other."""
+    robot, fixture = mounted_robot_of(arguments), fixture_of(arguments)
+    if arguments.print is not None:
+        if arguments.sheet is None:
+            raise InputError("--print", arguments.print, "with --sheet: other boards are not printed on paper")
+        write_file(arguments.print, sheet_svg(arguments.sheet))
+    given = _touches(robot, arguments.touches) if arguments.touches is not None else None
+    noise = TouchNoise.of(robot)
+    if arguments.noise is not None:
+        noise = replace(noise, joint=quantity(arguments.noise, units_of(arguments).angles, "--noise"))
+    assumed = TableTolerances.of(robot)
+    tolerances = replace(
+        assumed,
+        scale=PRINTED if arguments.printed else assumed.scale,
+        wave=WAVE if arguments.waves else 0.0,
+        keep_family=arguments.keep_family,
+    )
+    if given is None or arguments.plan is not None:
+        height = None
+        if arguments.table is not None:
+            height = quantity(arguments.table, units_of(arguments).lengths, "--table")
+        plan = touch_postures(
+            robot,
+            fixture,
+            arguments.plan or TOUCHES,
+            places=_places(arguments),
+            table=height,
+            done=None if given is None else (given[1], given[2]),
+            tolerances=tolerances,
+            noise=noise,
+        )
+        return _print_plan(robot, plan, arguments)
+    places, q, sockets = given
+    try:
+        found = calibrate(robot, q, sockets, fixture, tolerances=tolerances, noise=noise)
+    except InputError as error:
+        raise _at_line(error, places, fixture) from None
+    return _print_fit(found, sockets, arguments)
+
+
+def fixture_of(arguments: Namespace) -> TouchFixture:
+    """The fixture of ``--pin``, ``--bar`` or ``--sheet`` at its places."""
+    units = units_of(arguments)
+    if arguments.bar is not None:
+        board = TouchBoard.bar(quantity(arguments.bar, units.lengths, "--bar"))
+    else:
+        board = TouchBoard.pin() if arguments.sheet is None else TouchBoard.sheet(arguments.sheet)
+    places = _places(arguments)
+    if arguments.marked and places is None:
+        raise InputError("--marked", "no --place", "--place with the pose of each board")
+    count = len(places) if places is not None else arguments.places
+    return TouchFixture([board] * count, arguments.plane, places if arguments.marked else None)
+
+
+def _places(arguments: Namespace) -> list[Array] | None:
+    """The poses of ``--place``."""
+    units = units_of(arguments)
+    return [pose_of(texts, "--place", units) for texts in arguments.place] or None
+
+
+def _columns(robot: Robot) -> list[str]:
+    return ["socket", *(f"q{i + 1}" for i in range(robot.n))]
+
+
+def _touches(robot: Robot, file: str) -> tuple[list[str], Array, Array]:
+    """The places of the rows of a file, joint values ``(k, n)``, and sockets ``(k,)`` from 0."""
+    with opened_source(file, "TOUCHES") as opened:
+        rows = opened.numbers(_columns(robot))
+    values = np.array([row for _, row in rows]).reshape(-1, robot.n + 1)
+    read = ~np.isnan(values).all(axis=1)
+    return (
+        [place for (place, _), kept in zip(rows, read, strict=True) if kept],
+        values[read, 1:],
+        values[read, 0] - 1.0,
+    )
+
+
+def _at_line(error: InputError, places: list[str], fixture: TouchFixture) -> InputError:
+    """The error with the line of the file in which a touch is; there, sockets are counted from 1."""
+    match = re.fullmatch(r"(q|sockets)\[(\d+)\](?:\[(\d+)\])?", error.field)
+    if match is None:
+        return error
+    place = places[int(match[2])]
+    if match[1] == "q":
+        return error.renamed(f"{place}, q{int(match[3]) + 1}")
+    valid = f"a socket of the fixture, 1 to {len(fixture.local)}" + (
+        ", or 0 for its plane" if fixture.plane else ""
+    )
+    return InputError(f"{place}, socket", float(error.value) + 1.0, valid)
+
+
+def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
+    """Print or write the postures of a plan."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(_columns(robot))
+    rows.writerows([socket + 1, *q] for socket, q in zip(plan.sockets.tolist(), plan.q.tolist(), strict=True))
+    if arguments.output is not None:
+        write_file(arguments.output, text.getvalue())
+    if arguments.json:
+        return print_json(touch_plan_answer(plan))
+    notation = Notation(robot, arguments.rad)
+    print(plan.text)
+    for b, T in enumerate(plan.places):
+        x, y, z = (f"{notation.length(value)} {notation.of_length}" for value in T[:3, 3].tolist())
+        yaw = math.atan2(T[1, 0], T[0, 0])
+        print(f"board {b + 1}  at about x {x}, y {y}, z {z}, turned by {notation.angle(yaw)} about z")
+    shown = [
+        [
+            str(k + 1),
+            str(socket + 1) if socket >= 0 else "plane",
+            *(notation.joint(i, value) for i, value in enumerate(q)),
+        ]
+        for k, (socket, q) in enumerate(zip(plan.sockets.tolist(), plan.q.tolist(), strict=True))
+    ]
+    print("\n" + table(["touch", "socket", *(joint.name for joint in robot.joints)], shown))
+    return 0
+
+
+def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
+    """Print what was found, and write the arm and the report."""
+    if arguments.output is not None:
+        write_file(arguments.output, robot_to_toml(found.robot))
+    if arguments.html is not None:
+        write_file(arguments.html, report(found, sockets.astype(int).tolist()))
+    if arguments.json:
+        print_json(calibration_answer(found))
+    else:
+        print(found.text)
+        seen = [error for error in found.errors if error.seen]
+        print("\n" + "\n".join(f"  {error.text}" for error in seen))
+        left = len(found.errors) - len(seen)
+        if left:
+            print(f"  {left} more are not seen; --json has them, with the reason")
+        print("\ntouch  off by")
+        for k, miss in enumerate(found.misses.tolist()):
+            note = "" if k in found.kept else "  left out"
+            print(f"{k + 1:5d}  {millimetres(miss)}{note}")
+    return 1 if found.faults or found.noise >= 2.0 else 0

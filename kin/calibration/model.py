@@ -1,0 +1,194 @@
+"""What is assumed before anything is touched: how wrong a table, a reading and a contact may be.
+
+The tolerances are the prior of the fit: each error is taken to be Gaussian, with the standard deviation of one
+that is uniform within its tolerance. So the fit is defined with few touches, what no touch sees keeps its nominal
+value, and of errors that move the tool point alike each gets its share.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.calibration.chain import Chain, Mask
+from kin.calibration.fixtures import TouchFixture, Whole
+from kin.errors import InputError, finite_number
+from kin.robot import Robot
+from kin.transforms import Array, finite_array
+
+_FINE = (math.radians(0.005), 0.1e-3)  # of an industrial arm: a reading, a contact in a socket
+_HOBBY_PLAY, _HOBBY_CONTACT = math.radians(0.3), 0.3e-3  # of an arm of hobby servos
+_PRINTED = 0.005
+_MOST = {
+    "zero": math.radians(30.0),
+    "length": 0.1,
+    "twist": math.radians(30.0),
+    "tip": 0.5,
+    "scale": 0.1,
+    "wave": 0.2,
+}
+
+
+@dataclass(frozen=True)
+class TableTolerances:
+    """Largest errors that are expected of a table. The fit takes them to be up to three times as large.
+
+    Attributes:
+        zero: of a joint's zero, radians.
+        length: of a length d or a, metres.
+        twist: of a twist α and a tilt β, radians.
+        tip: of the tool point, metres in each direction.
+        scale: share by which all lengths may be larger or smaller; 0 for an arm that is not printed.
+        wave: of an encoder's error that repeats every turn, radians; 0 if there is none.
+        keep_family: whether what is zero in the table stays zero, and twists stay as they are. The arm keeps its
+            closed form then, and more of its errors.
+
+    Raises:
+        InputError: a tolerance that is negative or too large, or a zero, length, twist or tip that is 0.
+    """
+
+    zero: float = math.radians(2.0)
+    length: float = 1e-3
+    twist: float = math.radians(0.3)
+    tip: float = 5e-3
+    scale: float = 0.0
+    wave: float = 0.0
+    keep_family: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        for key, most in _MOST.items():
+            value = finite_number(key, getattr(self, key))
+            if not 0.0 <= value <= most or (value == 0.0 and key not in ("scale", "wave")):
+                raise InputError(key, value, f"a positive number of at most {most:.4g}")
+
+    @classmethod
+    def of(cls, robot: Robot) -> TableTolerances:
+        """What is assumed where nothing is stated: the lengths of an arm of servos are printed."""
+        return cls(scale=_PRINTED if robot.motors else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TouchNoise:
+    """What a reading and a contact are off by at random, as standard deviations.
+
+    Attributes:
+        joint: of a reading, one number or ``(n,)``, radians (metres for slides). Play counts, and bending.
+        contact: of a contact in a socket, in each direction, metres.
+
+    Raises:
+        InputError: a number that is not positive.
+    """
+
+    joint: ArrayLike = _FINE[0]
+    contact: float = _FINE[1]
+
+    def __post_init__(self) -> None:
+        """Check the fields."""
+        joint = np.asarray(self.joint, dtype=np.float64)
+        if not (np.isfinite(joint).all() and (joint > 0.0).all() and (joint < 0.5).all()):
+            raise InputError("joint", self.joint, "positive numbers below 0.5 (radians or metres)")
+        if not 0.0 < finite_number("contact", self.contact) <= 0.1:
+            raise InputError("contact", self.contact, "a positive number of at most 0.1 m")
+
+    @classmethod
+    def of(cls, robot: Robot) -> TouchNoise:
+        """Of an arm with motors as hobby servos have it: their ticks, and ±0.3° of play. Else 0.005°."""
+        if not robot.motors:
+            return cls()
+        ticks = {motor.joint: motor.ticks for motor in robot.motors}
+        step = np.array([2.0 * math.pi / ticks.get(joint.name, 4096) for joint in robot.joints])
+        return cls(np.sqrt(step**2 / 12.0 + _HOBBY_PLAY**2 / 3.0), _HOBBY_CONTACT)
+
+    def joints(self, robot: Robot) -> Array:
+        """Of each joint ``(n,)``."""
+        joint = np.asarray(self.joint, dtype=np.float64)
+        return np.full(robot.n, float(joint)) if joint.ndim == 0 else finite_array("joint", joint, (robot.n,))
+
+    def times(self, factor: float) -> TouchNoise:
+        """A larger noise."""
+        return TouchNoise(np.asarray(self.joint) * factor, self.contact * factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """An arm whose table is not trusted.
+
+    Attributes:
+        sigma: ``(p,)`` standard deviations of the parameters before anything is touched, 0 for those that stay.
+    """
+
+    chain: Chain
+    fixture: TouchFixture
+    sigma: Array
+    noise: TouchNoise
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        fixture: TouchFixture,
+        tolerances: TableTolerances | None = None,
+        noise: TouchNoise | None = None,
+    ) -> Model:
+        """The model of an arm; what is not given is assumed."""
+        tolerances = TableTolerances.of(robot) if tolerances is None else tolerances
+        noise = TouchNoise.of(robot) if noise is None else noise
+        noise.joints(robot)
+        chain = Chain(robot, tolerances.wave > 0.0, tolerances.scale > 0.0)
+        sigma = [getattr(tolerances, each.kind) / math.sqrt(3.0) for each in chain.parameters]
+        if tolerances.keep_family:
+            kept = [
+                each.kind == "twist" or (each.kind in ("length", "tip") and abs(each.nominal) < 1e-9)
+                for each in chain.parameters
+            ]
+            sigma = np.where(kept, 0.0, sigma).tolist()
+        return cls(chain, fixture, np.array(sigma), noise)
+
+    @property
+    def robot(self) -> Robot:
+        """The arm with its nominal table."""
+        return self.chain.robot
+
+    @property
+    def count(self) -> int:
+        """Number of parameters of the arm."""
+        return len(self.sigma)
+
+    @property
+    def of_table(self) -> Mask:
+        """Which parameters are errors of the table: not the tool point, which nobody knows well ``(p,)``."""
+        return np.asarray(self.chain.kinds != "tip")
+
+    @property
+    def prior(self) -> Array:
+        """Standard deviations of all unknowns, those of the fixture last."""
+        return np.concatenate([self.sigma, self.fixture.sigma()])
+
+    def wider(self, noise: float, tolerance: float) -> Model:
+        """The model with a larger noise, and a table with larger errors."""
+        sigma = np.where(self.of_table, self.sigma * tolerance, self.sigma)
+        return replace(self, sigma=sigma, noise=self.noise.times(noise))
+
+    def whitening(self, by_joint: Array, A: Array, at: Whole) -> Array:
+        """W ``(k, 3, 3)`` with W S Wᵀ = 1, where S is the covariance of each touch's miss."""
+        through = A @ by_joint * self.noise.joints(self.robot)
+        contact = self.fixture.contacts(at, self.noise.contact)
+        S = through @ through.transpose(0, 2, 1) + (contact**2)[:, None, None] * A @ A.transpose(0, 2, 1)
+        flat = at < 0  # a plane gives one equation
+        S[flat, 1, 1] = S[flat, 2, 2] = 1.0
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(S)))
+
+
+def tip_modes(chain: Chain, q: Array) -> Array:
+    """How parameters move the tip at configurations ``(3k, p)``, less what a motion of the base does as well."""
+    found = chain.derivatives(q, np.zeros(len(chain.parameters)))
+    L = found.by_parameter.reshape(3 * len(q), -1)
+    turns = np.cross(np.eye(3)[None], found.points[:, None, :])
+    shifts = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    B = np.concatenate([shifts, turns.transpose(0, 2, 1)], axis=2).reshape(-1, 6)
+    Q, _ = np.linalg.qr(B)
+    return np.asarray(L - Q @ (Q.T @ L))

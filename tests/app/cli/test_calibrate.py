@@ -1,0 +1,115 @@
+"""``kinboard calibrate``: a plan, a fit, files, and what is wrong with touches by the line of their file."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kin
+from app.cli.parser import main
+from app.exports.touch import sheet_svg
+from app.shared.answers.inspection import inspect
+from kin.robot import NominalTable
+
+
+@pytest.fixture(scope="module")
+def touches(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plan, whose postures are taken for readings."""
+    file = tmp_path_factory.mktemp("touches") / "plan.csv"
+    assert main(["calibrate", "ur5e", "--bar", "150", "--plan", "10", "-o", str(file)]) == 0
+    return file
+
+
+def test_a_plan_is_printed_and_written(touches: Path, capsys) -> None:
+    lines = touches.read_text().splitlines()
+    assert lines[0] == "socket,q1,q2,q3,q4,q5,q6"
+    assert len(lines) == 11
+    assert {line.split(",")[0] for line in lines[1:]} == {"1", "2"}
+    assert main(["calibrate", "ur5e", str(touches), "--bar", "150", "--plan", "3", "--json"]) == 0
+    more = json.loads(capsys.readouterr().out)
+    assert len(more["q"]) == 3
+    assert more["expected"]["after"] < more["expected"]["before"]
+
+
+def test_a_fit_is_printed_and_written(touches: Path, tmp_path: Path, capsys) -> None:
+    arm, page = tmp_path / "mine.toml", tmp_path / "result.html"
+    words = ["calibrate", "ur5e", str(touches), "--bar", "150", "-o", str(arm), "--html", str(page)]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert "The tip is expected to be off by" in out
+    assert "touch  off by" in out
+    found = kin.load_robot(arm)
+    assert found.nominal is not None
+    q = found.random_q(np.random.default_rng(1), 20)
+    assert np.abs(kin.fk_positions(found, q) - kin.fk_positions("ur5e", q)).max() < 1e-5
+    html = page.read_text(encoding="utf-8")
+    assert html.count("<svg") > 30
+    assert "http" not in html
+    assert main([*words[:5], "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert len(answer["misses"]) == 10
+    assert kin.robot_from_dict(answer["robot"]).nominal is not None
+
+
+def test_axes_of_a_calibrated_table_are_meant_as_they_are() -> None:
+    robot = kin.get_robot("ur5e")
+    rows = tuple(replace(row, alpha=row.alpha + 1e-3) for row in robot.rows)
+    typed = replace(robot, rows=rows)
+    measured = replace(typed, nominal=NominalTable(robot.rows, robot.tool))
+    assert any("almost parallel" in text for text in inspect(typed).warnings)
+    assert not any("almost" in text for text in inspect(measured).warnings)
+
+
+def test_a_contradiction_ends_with_1(touches: Path, tmp_path: Path, capsys) -> None:
+    rows = [line.split(",") for line in touches.read_text().splitlines()]
+    rows[4][2] = str(float(rows[4][2]) + 0.05)
+    file = tmp_path / "wrong.csv"
+    file.write_text("\n".join(",".join(row) for row in rows))
+    assert main(["calibrate", "ur5e", str(file), "--bar", "150"]) == 1
+    assert "Touch 4 does not fit the others" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "value", "said"),
+    [
+        (3, 0, "7", "TOUCHES line 4, socket: got 7.0, expected a socket of the fixture, 1 to 2"),
+        (5, 2, "400", "TOUCHES line 6, q2: got 400.0, expected"),
+        (5, 2, "x", "TOUCHES line 6"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(
+    touches: Path, tmp_path: Path, capsys, row, column, value, said
+) -> None:
+    rows = [line.split(",") for line in touches.read_text().splitlines()]
+    rows[row][column] = value
+    file = tmp_path / "bad.csv"
+    file.write_text("\n".join(",".join(row) for row in rows))
+    assert main(["calibrate", "ur5e", str(file), "--bar", "150"]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_options_that_do_not_fit_are_refused(capsys, tmp_path: Path) -> None:
+    assert main(["calibrate", "ur5e"]) == 2
+    assert "--pin" in capsys.readouterr().err
+    assert main(["calibrate", "ur5e", "--pin", "--marked"]) == 2
+    assert "--place" in capsys.readouterr().err
+    assert main(["calibrate", "ur5e", "--pin", "--print", str(tmp_path / "a.svg")]) == 2
+    assert "--sheet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("paper", "width", "height"), [("A5", 148, 210), ("A4", 210, 297), ("A3", 297, 420)])
+def test_the_sheet_is_true_to_scale(paper: str, width: int, height: int) -> None:
+    svg = sheet_svg(paper)
+    assert f'width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}"' in svg
+    board = kin.calibration.TouchBoard.sheet(paper)
+    centres = np.array(re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', svg), float)
+    assert np.abs(centres[:, 0] - 0.5 * width - 1000.0 * board.sockets[:, 0]).max() < 1e-3
+    assert np.abs(0.5 * height - centres[:, 1] - 1000.0 * board.sockets[:, 1]).max() < 1e-3
+    (line,) = re.findall(r"h(100)M", svg)
+    assert "This line is 100 mm long" in svg
+    assert line == "100"
