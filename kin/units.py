@@ -139,7 +139,7 @@ class Unit:
 
 
 DEGREES, RADIANS = Unit("°", 180.0 / math.pi, 0, "degrees"), Unit("rad", 1.0, 2, "radians")
-# Every list of units of length is made of this one, but for that in `static/takehome/page.js`.
+# Every list of units of length is made of this one, but for that in `static/takehome/numbers.js`.
 _OF_LENGTH: dict[Length, Unit] = {
     "mm": Unit("mm", 1e3, 0, "millimetres"),
     "cm": Unit("cm", 1e2, 1, "centimetres"),
