@@ -1,0 +1,215 @@
+"""``python tests/bench/generated.py``: C and JavaScript that `kin.generate` writes, beside `kin.solve_ik`.
+
+One arm of each family. The same entry (all postures inside the limits, at their nearest whole turns, each checked
+by forward kinematics, sorted by the seed) solves the same targets as C (``gcc -O2``) and as JavaScript (the Node
+of Playwright), beside `kin.solve_ik`; times are processor time, least of some passes. Machine code and the stack
+of the deepest chain of calls are those of ``gcc -Os``; ``-m32 -msoft-float`` stands for a microcontroller that
+computes with floats in software.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import gzip
+import json
+import math
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from playwright._impl._driver import compute_driver_executable
+
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(TESTS.parent), str(TESTS / "kin" / "codegen")]
+
+from emitted import ROBOTS, targets  # noqa: E402
+
+import kin  # noqa: E402
+from kin.codegen import files  # noqa: E402
+from kin.codegen.arm import Arm, arm_of  # noqa: E402
+from kin.solvers import family_of  # noqa: E402
+
+TARGETS, PASSES = 500, 5
+SOFT = "pioneer5"  # the arm that is compiled for a machine without floats
+
+
+class Figures(NamedTuple):
+    """Of one arm: microseconds a target, texts, and bytes."""
+
+    c: float
+    js: float
+    solve_ik: float
+    c_text: bytes
+    js_text: bytes
+    code: int
+    stack: int
+
+    def row(self) -> list[str]:
+        """The cells of a table."""
+        times = [f"{x:.1f} µs" for x in (self.c, self.js, self.solve_ik)]
+        texts = [
+            f"{len(x) / 1000:.0f} kB ({len(gzip.compress(x)) / 1000:.0f})" for x in (self.c_text, self.js_text)
+        ]
+        sizes = [f"{x / 1000:.0f} kB" for x in (self.code, self.stack)]
+        return [*times, *texts, *sizes]
+
+
+def microseconds(run: Callable[[], int], count: int) -> tuple[float, int]:
+    """Processor time of one of `count` targets, least of the passes, and what a pass returns."""
+    total = run()
+    spent = []
+    for _ in range(PASSES):
+        start = time.process_time()
+        run()
+        spent.append(time.process_time() - start)
+    return 1e6 * min(spent) / count, total
+
+
+def in_c(arm: Arm, name: str, folder: Path, T: Any, seeds: Any, values: Any) -> Callable[[], int]:
+    """The C file in this process."""
+    call = f"{name}_ik_at(T + 16 * i, values[i]," if arm.alone.needs_value else f"{name}_ik(T + 16 * i,"
+    (folder / "many.c").write_text(f"""#define {name.upper()}_IMPLEMENTATION
+#include "{name}.c"
+int many(const double *T, const double *seeds, const double *values, int n) {{
+  {name}_solution found[{arm.rows}];
+  int count, total = 0;
+  (void)values;
+  for (int i = 0; i < n; i++) {{ {call} seeds + {arm.robot.n} * i, found, &count); total += count; }}
+  return total;
+}}
+""")
+    gcc(folder, "-shared", "-fPIC", "-O2", "many.c", "-o", "many.so", "-lm")
+    library = ctypes.CDLL(str(folder / "many.so"))
+    pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (T, seeds, values)]
+    return lambda: int(library.many(*pointers, len(T)))
+
+
+def in_javascript(arm: Arm, name: str, folder: Path, T: Any, seeds: Any, values: Any) -> tuple[float, int]:
+    """Microseconds a target of the script in Node, and the solutions of a pass."""
+    asked = {"T": T.tolist(), "seeds": seeds.tolist(), "values": np.nan_to_num(values).tolist()}
+    (folder / "asked.json").write_text(json.dumps(asked))
+    call = "arm.ik_at(T[i], values[i], seeds[i])" if arm.alone.needs_value else "arm.ik(T[i], seeds[i])"
+    run = f"""
+const arm = require("./{name}.js"), {{ T, seeds, values }} = require("./asked.json");
+let least = Infinity, total = 0;
+for (let pass = 0; pass < {2 * PASSES}; pass++) {{
+  const start = process.cpuUsage().user;
+  total = 0;
+  for (let i = 0; i < T.length; i++) total += {call}.solutions.length;
+  least = Math.min(least, process.cpuUsage().user - start);
+}}
+console.log(JSON.stringify([least / T.length, total]));
+"""
+    command = [compute_driver_executable()[0], "-e", run]
+    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
+    spent, total = json.loads(done)
+    return float(spent), int(total)
+
+
+def gcc(folder: Path, *arguments: str) -> None:
+    """Run the compiler in a folder."""
+    subprocess.run(["gcc", "-std=c99", "-w", *arguments], cwd=folder, check=True)
+
+
+def size(folder: Path, file: str) -> int:
+    """Bytes of machine code and constants of an object file."""
+    done = subprocess.run(["size", file], cwd=folder, check=True, capture_output=True, text=True)
+    return int(done.stdout.splitlines()[1].split()[0])
+
+
+def stack(graph: str, entry: str) -> int:
+    """Bytes of stack of the deepest chain of calls from a function, in a graph of ``-fcallgraph-info=su``."""
+    own = {
+        title: int(found[1]) if (found := re.search(r"(\d+) bytes", label)) else 0
+        for title, label in re.findall(r'node: { title: "([^"]*)" label: "([^"]*)"', graph)
+    }
+    calls: dict[str, set[str]] = {}
+    for caller, callee in re.findall(r'edge: { sourcename: "([^"]*)" targetname: "([^"]*)"', graph):
+        calls.setdefault(caller, set()).add(callee)
+
+    @cache
+    def deepest(name: str) -> int:
+        return own.get(name, 0) + max(map(deepest, calls.get(name, ())), default=0)
+
+    return deepest(entry)
+
+
+def footprint(name: str, folder: Path, entry: str, *options: str) -> tuple[int, int]:
+    """Bytes of machine code and of stack of the C file with ``-Os``."""
+    define = f"-D{name.upper()}_IMPLEMENTATION"
+    gcc(folder, "-Os", "-fcallgraph-info=su", define, *options, "-c", f"{name}.c", "-o", f"{name}.o")
+    return size(folder, f"{name}.o"), stack((folder / f"{name}.ci").read_text(), entry)
+
+
+def without_floats(folder: Path) -> tuple[int, int]:
+    """The footprint of an arm on a 32-bit machine that computes with floats in software."""
+    (folder / "gnu").mkdir()
+    (folder / "gnu" / "stubs-32.h").touch()  # all that is missing where only the 64-bit library is installed
+    (folder / f"{SOFT}.c").write_text(kin.generate(SOFT, closest=False))
+    headers = "-I.", "-isystem", "/usr/include/x86_64-linux-gnu"
+    return footprint(SOFT, folder, f"{SOFT}_ik", "-m32", "-msoft-float", *headers)
+
+
+def measured(robot: kin.Robot, folder: Path) -> Figures:
+    """The figures of an arm.
+
+    Raises:
+        SystemExit: C or JavaScript finds another number of solutions.
+    """
+    arm, name = arm_of(robot), files.name_for(robot, None)
+    T, seeds, q = targets(robot, TARGETS, 0)
+    given = arm.parameter.joint if arm.alone.needs_value and arm.parameter else None
+    values = np.full(len(q), math.nan) if given is None else q[:, given].copy()
+    texts = {"c": files.c_file(arm, name).encode(), "js": files.js_file(arm, name, "js").encode()}
+    for language, text in texts.items():
+        (folder / f"{name}.{language}").write_bytes(text)
+    in_c_, found = microseconds(in_c(arm, name, folder, T, seeds, values), len(T))
+    in_js, also = in_javascript(arm, name, folder, T, seeds, values)
+    if found != also:
+        sys.exit(f"{robot.id}: {found} solutions in C, {also} in JavaScript")
+
+    def ask() -> int:
+        return sum(
+            len(kin.solve_ik(robot, pose, q_seed=seed, redundancy=None if given is None else value).solutions)
+            for pose, seed, value in zip(T, seeds, values.tolist(), strict=True)
+        )
+
+    code, deep = footprint(name, folder, f"{name}_ik" + "_at" * arm.alone.needs_value)
+    return Figures(in_c_, in_js, microseconds(ask, len(T))[0], texts["c"], texts["js"], code, deep)
+
+
+def one_of_each() -> list[kin.Robot]:
+    """The first arm of each family, of built-in ones first."""
+    found: dict[str, kin.Robot] = {}
+    for robot in ROBOTS.values():
+        found.setdefault(family_of(robot), robot)
+    return list(found.values())
+
+
+def main() -> None:
+    """Print the table."""
+    options = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    options.add_argument("robots", nargs="*", help="ids of arms; by default one of each family")
+    chosen = [ROBOTS[each] for each in options.parse_args().robots] or one_of_each()
+    print("| arm, family | C | JavaScript | `solve_ik` | text of C | of JavaScript | code | stack |")
+    print("|---|---|---|---|---|---|---|---|")
+    for robot in chosen:
+        with tempfile.TemporaryDirectory() as folder:
+            row = measured(robot, Path(folder)).row()
+        print(" | ".join([f"| {robot.id}, `{family_of(robot)}`", *row]) + " |", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        code, deep = without_floats(Path(folder))
+    sizes = f"{code / 1000:.0f} kB of code, {deep / 1000:.0f} kB of stack"
+    print(f"\n{SOFT} without `nearest`, gcc -Os -m32 -msoft-float: {sizes}")
+
+
+if __name__ == "__main__":
+    main()
