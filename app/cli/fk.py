@@ -129,7 +129,7 @@ def _put(
         return
     numbers = np.full((len(q), len(table.names)), np.nan)
     numbers[present] = np.array(table.rows(T[present])).reshape(-1, len(table.names))
-    inside = robot.in_limits(q)
-    within = [bool(inside[i]) if there else "" for i, there in enumerate(present)]
+    inside = iter(robot.in_limits(q[present]).tolist())
+    within = [next(inside) if there else "" for there in present]
     said = [reasons.get(i, "") for i in range(len(q))]
     sink.rows([*row, *rest] for row, *rest in zip(numbers.tolist(), within, said, strict=True))
