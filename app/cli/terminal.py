@@ -52,7 +52,7 @@ def robot_of(arguments: Namespace) -> Robot:
 
 def named_robot(arguments: Namespace, named: str) -> Robot:
     """A robot by its id, or by the path of a file."""
-    if Path(named).suffix in (".urdf", ".xml", ".toml"):
+    if Path(named).suffix.lower() in (".urdf", ".xml", ".toml"):
         return load_robot(Path(named))
     return store_of(arguments).get(named)
 

@@ -37,7 +37,7 @@ OBSOLETE: Final[Mapping[str, str]] = MappingProxyType(
     )
     | {
         "KINBOARD_BENCH": "visitors start no benchmark; kinboard bench --html FILE makes a scoreboard",
-        "KINBOARD_PIN": "the service is no faster on one processor",
+        "KINBOARD_PIN": "one process serves all, on any processor",
     }
 )
 

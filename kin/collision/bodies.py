@@ -77,7 +77,8 @@ def bodies_of(robot: Robot, home_is_free: bool = True) -> Bodies:
     Args:
         home_is_free: whether links that touch at the home configuration are not compared.
     """
-    if (nominal := robot.nominal_arm) is not None:
+    nominal = robot.nominal_arm
+    if nominal is not None and {row.name for row in nominal.rows} <= {row.name for row in robot.rows}:
         return _moved(bodies_of(nominal, home_is_free), nominal, robot)
     found = _with_tool(robot) if robot.capsules else _assumed(robot)
     rows = np.array([each.row for each in found], np.int64)
@@ -107,7 +108,7 @@ def bodies_of(robot: Robot, home_is_free: bool = True) -> Bodies:
 def _moved(bodies: Bodies, nominal: Robot, robot: Robot) -> Bodies:
     """The bodies of a nominal arm in the frames of the calibrated one."""
     places = {row.name: i for i, row in enumerate(robot.rows)}
-    own = [places.get(row.name, -1) for row in nominal.rows]
+    own = [places[row.name] for row in nominal.rows]
     found = tuple(replace(each, row=own[each.row] if each.row >= 0 else -1) for each in bodies.capsules)
     return replace(bodies, capsules=found, rows=np.array([each.row for each in found], np.int64))
 

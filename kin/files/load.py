@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from kin.errors import InputError
@@ -9,10 +10,11 @@ from kin.files.read import load_toml, parse_robot
 from kin.files.urdf.read import read_urdf
 from kin.robot import Robot
 
-_XML = {".urdf", ".xml", ".mjcf"}
+_XML = {".urdf", ".xml", ".mjcf", ".xacro"}
+_MARK = b"\xef\xbb\xbf"  # of the byte order
 
 
-def load_robot(source: Path | str, base: str | None = None, tip: str | None = None) -> Robot:
+def load_robot(source: os.PathLike[str] | str, base: str | None = None, tip: str | None = None) -> Robot:
     """The robot of a robot file (TOML), a URDF or an MJCF model, by path or text.
 
     `kin.files.read_urdf` reports about a URDF as well. It and `kin.files.parse_robot` take no text for a path, and
@@ -39,16 +41,29 @@ def load_robot(source: Path | str, base: str | None = None, tip: str | None = No
         >>> kin.load_robot(kin.robot_to_urdf("ur5"), tip="tool").n
         6
     """
-    if not isinstance(source, str | Path):
+    if not isinstance(source, str | os.PathLike):
         raise InputError("source", source, "the path of a file, or the text of a robot file, URDF or MJCF model")
     text = source if isinstance(source, str) and ("<" in source or "\n" in source.strip()) else None
-    if text is None and Path(source).suffix in _XML:
+    if text is None and _is_xml(Path(source)):
         return read_urdf(Path(source), base, tip).robot
     if text is not None and (
-        text.lstrip("\ufeff \t\r\n").startswith("<") or "<robot" in text or "<mujoco" in text
+        text.lstrip("\ufeff \t\r\n").startswith("<")
+        or ("[[rows]]" not in text and ("<robot" in text or "<mujoco" in text))
     ):
         return read_urdf(text, base, tip).robot
     for field, link in (("base", base), ("tip", tip)):
         if link is not None:
             raise InputError(field, link, "none: a robot file has no links")
     return load_toml(Path(source)) if text is None else parse_robot(text)
+
+
+def _is_xml(path: Path) -> bool:
+    """Whether a file is a URDF or an MJCF model: by its ending, or where that says nothing by its first letter."""
+    ending = path.suffix.lower()
+    if ending == ".toml" or ending in _XML or not path.is_file():
+        return ending in _XML
+    try:
+        with path.open("rb") as file:
+            return file.read(1000).removeprefix(_MARK).lstrip().startswith(b"<")
+    except OSError:
+        return False  # the reader says why it cannot be read

@@ -248,6 +248,9 @@ class Reader:
         if moving != own:
             names = ", ".join(row.name for row in rows if row.moves)
             raise self.refuse("nominal.rows", [name for name, *_ in moving], f"the rows that move: {names}")
+        known = [row.name for row in found]
+        if (here := [row.name for row in rows if row.name in known]) != known:
+            raise self.refuse("nominal.rows", known, f"rows of the arm in their order, such as {', '.join(here)}")
         return NominalTable(found, self.transform(table, "tool", "nominal."))
 
     def joints(self, rows: Sequence[Joint], given: Sequence[Any]) -> tuple[Joint, ...]:

@@ -225,8 +225,9 @@ class _Stack:
             assert found is not None  # since the closed form handles the task
             self.found[i] = found
         q = np.empty((len(rows), self.prepared.robot.n))
-        nearest_rows(self.prepared.requirement, T, seeds, np.stack([self.found[i].q for i in rows]), q)
-        return _regular(self.prepared, q)
+        every = np.stack([self.found[i].q for i in rows])
+        nearest_rows(self.prepared.requirement, T, seeds, every, q)
+        return _regular(self.prepared, every, q)
 
 
 def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Array:
@@ -240,18 +241,18 @@ def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Ar
         rows = np.empty((len(rest), len(form.branches), q.shape[1]))
         form.solve_many(T, near, prepared.lower, prepared.upper, rows)
         nearest_rows(prepared.requirement, T, near, rows, found)
-        q[rest] = _regular(prepared, found)
+        q[rest] = _regular(prepared, rows, found)
     return q
 
 
-def _regular(prepared: IKProblem, q: Array) -> Array:
-    """q ``(k, n)``, in place NaN where a singular target may leave something free: the nearest is searched for."""
-    there = np.flatnonzero(~np.isnan(q[:, 0]))
+def _regular(prepared: IKProblem, rows: Array, q: Array) -> Array:
+    """q ``(k, n)``, in place NaN where one of all rows ``(k, m, n)`` is singular: the nearest is searched for."""
     if not prepared.searched:
         return q
-    J = task_rows(prepared.robot, q[there], "approach" if prepared.code == APPROACH else "pose")
+    there = np.argwhere(~np.isnan(rows[..., 0]))
+    J = task_rows(prepared.robot, rows[tuple(there.T)], "approach" if prepared.code == APPROACH else "pose")
     J[:, :3] /= prepared.unit
-    q[there[np.linalg.svd(J, compute_uv=False)[:, -1] < _SINGULAR]] = math.nan
+    q[there[np.linalg.svd(J, compute_uv=False)[:, -1] < _SINGULAR, 0]] = math.nan
     return q
 
 

@@ -285,6 +285,9 @@ class IKOptions:
             name, value = next(iter(keywords.items()))
             raise InputError(name, value, f"no {name} besides options")
         names = [each.name for each in fields(JointConstraints)]
+        if "constraints" in keywords:
+            expected = f"the constraints themselves ({', '.join(names)}), or options=kin.IKOptions(constraints=…)"
+            raise InputError("constraints", keywords["constraints"], expected)
         constraints = JointConstraints(**{name: keywords.pop(name) for name in names if name in keywords})
         return cls(constraints=constraints, **keywords)
 

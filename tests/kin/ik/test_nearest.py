@@ -346,3 +346,13 @@ def test_the_first_solution_of_an_arm_at_another_size_is_the_same():
         orders.append([(s.branch, round(s.distance, 6)) for s in found.solutions])
     assert orders[0] == orders[1] == orders[2]
     assert len(orders[0]) > 2
+
+
+def test_batches_search_where_another_posture_than_the_nearest_row_is_singular():
+    robot = kin.get_robot("ur5")
+    rng = np.random.default_rng(4)
+    q, seeds = robot.random_q(rng, 60), robot.random_q(rng, 60)
+    q[:, 4] = 0.0
+    found = kin.solve_ik_many(robot, kin.fk(robot, q), q_seed=seeds)
+    for i in range(60):
+        assert np.array_equal(found.q[i], found[i].best.q)
