@@ -44,10 +44,10 @@ def test_a_nominal_table_has_rows_of_the_arm_in_their_order() -> None:
     assert kin.load_robot(text).nominal_arm is not None
     place = text.index("[[nominal.rows]]")
     fixed = '[[nominal.rows]]\nname = "plate"\nkind = "fixed"\nd = 0.1\n\n'
-    with pytest.raises(kin.RobotFileError, match="nominal.rows.*rows of the arm in their order"):
+    with pytest.raises(kin.RobotFileError, match=r"nominal\.rows.*rows of the arm in their order"):
         kin.load_robot(text[:place] + fixed + text[place:])
 
 
 def test_constraints_are_refused_by_their_names() -> None:
-    with pytest.raises(InputError, match="constraints.*limits, locked"):
+    with pytest.raises(InputError, match=r"constraints.*limits, locked"):
         kin.solve_ik(UR5, np.eye(4), constraints=kin.JointConstraints())  # type: ignore[call-arg]
