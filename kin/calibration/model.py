@@ -108,10 +108,6 @@ class TouchNoise:
         joint = np.asarray(self.joint, dtype=np.float64)
         return np.full(robot.n, float(joint)) if joint.ndim == 0 else finite_array("joint", joint, (robot.n,))
 
-    def times(self, factor: float) -> TouchNoise:
-        """A larger noise."""
-        return TouchNoise(np.asarray(self.joint) * factor, self.contact * factor)
-
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -119,12 +115,15 @@ class Model:
 
     Attributes:
         sigma: ``(p,)`` standard deviations of the parameters before anything is touched, 0 for those that stay.
+        noise: as it was stated.
+        louder: by what it is multiplied: touches that contradict each other may ask for more than can be stated.
     """
 
     chain: Chain
     fixture: TouchFixture
     sigma: Array
     noise: TouchNoise
+    louder: float = 1.0
 
     @classmethod
     def of(
@@ -171,12 +170,12 @@ class Model:
     def wider(self, noise: float, tolerance: float) -> Model:
         """The model with a larger noise, and a table with larger errors."""
         sigma = np.where(self.of_table, self.sigma * tolerance, self.sigma)
-        return replace(self, sigma=sigma, noise=self.noise.times(noise))
+        return replace(self, sigma=sigma, louder=self.louder * noise)
 
     def whitening(self, by_joint: Array, A: Array, at: Whole) -> Array:
         """W ``(k, 3, 3)`` with W S Wᵀ = 1, where S is the covariance of each touch's miss."""
-        through = A @ by_joint * self.noise.joints(self.robot)
-        contact = self.fixture.contacts(at, self.noise.contact)
+        through = A @ by_joint * (self.louder * self.noise.joints(self.robot))
+        contact = self.fixture.contacts(at, self.louder * self.noise.contact)
         S = through @ through.transpose(0, 2, 1) + (contact**2)[:, None, None] * A @ A.transpose(0, 2, 1)
         flat = at < 0  # a plane gives one equation
         S[flat, 1, 1] = S[flat, 2, 2] = 1.0

@@ -74,6 +74,17 @@ def test_a_contradiction_ends_with_1(touches: Path, tmp_path: Path, capsys) -> N
     assert "Touch 4 does not fit the others" in capsys.readouterr().out
 
 
+def test_touches_of_mistaken_joints_end_with_1_and_a_report(touches: Path, tmp_path: Path, capsys) -> None:
+    rows = [line.split(",") for line in touches.read_text().splitlines()]
+    for row in rows[1:]:
+        row[2], row[3] = str(-float(row[2])), str(-float(row[3]))
+    file, page = tmp_path / "signs.csv", tmp_path / "report.html"
+    file.write_text("\n".join(",".join(row) for row in rows))
+    assert main(["calibrate", "ur5e", str(file), "--bar", "150", "--html", str(page)]) == 1
+    assert "times as much as stated" in capsys.readouterr().out
+    assert "times as much as stated" in page.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("row", "column", "value", "said"),
     [

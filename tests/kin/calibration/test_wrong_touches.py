@@ -108,3 +108,20 @@ def test_the_only_touch_of_a_board_is_not_blamed(ur5e):
     wrong = beside(case, model, errors, some, len(some) - 1, [0.0, 0.02, 0.0])
     found = kin.calibration.calibrate(case.robot, wrong.q, wrong.at, fixture, noise=FINE.noise)
     assert len(some) - 1 in found.kept
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        lambda q: q * [1.0, -1.0, -1.0, 1.0, 1.0, 1.0],
+        np.negative,
+        lambda q: q[:, [2, 0, 1, 3, 4, 5]],
+        lambda q: np.random.default_rng(1).uniform(-3.0, 3.0, q.shape),
+    ],
+    ids=["two signs", "all signs", "columns", "random"],
+)
+def test_touches_that_no_table_explains_are_an_answer(ur5e, mistake):
+    _, _, touches = ur5e.simulated(29, COUNT)
+    found = kin.calibration.calibrate(ur5e.robot, mistake(touches.q), touches.at, BAR, noise=FINE.noise)
+    assert found.noise > 2.0
+    assert "times as much as stated" in found.text
