@@ -174,10 +174,10 @@ def _cause(found: Fit, touches: Touches, k: int) -> Fault:
     ]
     for i, j in itertools.combinations(range(len(q)), 2):
         if abs(q[i] - q[j]) > _ALIKE:
-            tries.append((_exchanged(q, i, j), at, Fault(k, "swap", (i, j))))
+            tries.append((undone(q, "swap", (i, j)), at, Fault(k, "swap", (i, j))))
     for i in range(len(q)):
         if abs(q[i]) > _ALIKE:
-            tries.append((_turned_round(q, i), at, Fault(k, "sign", (i,))))
+            tries.append((undone(q, "sign", (i,)), at, Fault(k, "sign", (i,))))
     points = model.chain.points(np.array([each[0] for each in tries]), found.delta)
     misses = np.linalg.norm(found.places.misses(points, np.array([each[1] for each in tries])), axis=1)
     finalists: list[int] = (1 + np.argsort(misses[1:])[:_FINALISTS]).tolist()
@@ -192,17 +192,13 @@ def _cause(found: Fit, touches: Touches, k: int) -> Fault:
     return replace(tries[0][2], value=float(misses[0]))
 
 
-def _exchanged(q: Array, i: int, j: int) -> Array:
-    """Configurations ``(..., n)`` with two joint values exchanged."""
+def undone(q: Array, cause: Cause, joints: tuple[int, ...]) -> Array:
+    """Readings ``(..., n)`` without a wrong sign or an exchange; other causes are not in the readings."""
     q = q.copy()
-    q[..., [i, j]] = q[..., [j, i]]
-    return q
-
-
-def _turned_round(q: Array, i: int) -> Array:
-    """Configurations ``(..., n)`` with the other sign of one joint value."""
-    q = q.copy()
-    q[..., i] = -q[..., i]
+    if cause == "sign":
+        q[..., list(joints)] *= -1.0
+    elif cause == "swap":
+        q[..., list(joints)] = q[..., list(joints[::-1])]
     return q
 
 
@@ -215,9 +211,9 @@ def _mistakes(model: Model, touches: Touches) -> Iterator[tuple[Fault, Model, To
     """Single mistakes of all readings, each undone."""
     n = touches.q.shape[1]
     for i in range(n):
-        yield Fault(None, "sign", (i,)), model, Touches(_turned_round(touches.q, i), touches.at)
+        yield Fault(None, "sign", (i,)), model, Touches(undone(touches.q, "sign", (i,)), touches.at)
     for i, j in itertools.combinations(range(n), 2):
-        yield Fault(None, "swap", (i, j)), model, Touches(_exchanged(touches.q, i, j), touches.at)
+        yield Fault(None, "swap", (i, j)), model, Touches(undone(touches.q, "swap", (i, j)), touches.at)
     for i in range(1, n):  # that of joint 1 is not seen
         if model.robot.revolute[i]:
             sigma = model.sigma.copy()

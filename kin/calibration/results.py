@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kin.calibration.chain import ErrorKind
-from kin.calibration.faults import Cause
+from kin.calibration.faults import Cause, undone
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -90,8 +90,7 @@ class Calibration:
 
     Attributes:
         robot: the arm with its own table. Zeros of joints that have motors are in the offsets of the motors, not
-        in
-            the table, so joint values that the nominal motors gave are those of `corrected`.
+            in the table. Its values for what the nominal motors gave are those of `corrected`.
         nominal: the arm as it was.
         expected: how far its tip is expected to be off.
         errors: of the table and the tool point, in the order of the rows.
@@ -134,12 +133,17 @@ class Calibration:
             q: ``(..., n)`` joint values as they were given to `kin.calibration.calibrate`, radians (metres).
 
         Returns:
-            ``(..., n)`` with the zeros that are in the motors, and without the waves of encoders.
+            ``(..., n)`` with the mistakes of all touches undone (signs, exchanged joints), with the zeros that are
+            in the motors, and without the waves of encoders.
 
         Raises:
             InputError: q has another number of joints, or values that are not finite.
         """
         q = self.nominal.check_q(q)
+        names = [joint.name for joint in self.nominal.joints]
+        for fault in self.faults:
+            if fault.touch is None:
+                q = undone(q, fault.cause, tuple(names.index(name) for name in fault.joints))
         return np.asarray(q + self.zeros + self.waves[:, 0] * np.sin(q) + self.waves[:, 1] * np.cos(q))
 
 

@@ -67,14 +67,16 @@ def fault_text(fault: TouchFault, socket: int) -> str:
     """A mistake, and what was done about it; `socket` is what was to be touched."""
     who = "In all touches" if fault.touch is None else f"In touch {fault.touch + 1}"
     joints = listed(fault.joints)
-    done = "The table is that of corrected readings." if fault.touch is None else "It was left out."
+    done = "It was left out."
+    if fault.touch is None:
+        done = "The table is that of corrected readings: correct yours too before you use it."
     match fault.cause:
         case "swap":
             return f"{who}, the readings of {joints} are exchanged. {done}"
         case "sign":
             return f"{who}, {joints} counts backwards. {done}"
         case "zero":
-            return f"{who}, the zero of {joints} is off by {degrees(fault.value)}. {done}"
+            return f"{who}, the zero of {joints} is off by {degrees(fault.value)}. The result makes up for it."
         case "socket":
             assert fault.socket is not None
             return f"{who}, socket {fault.socket + 1} was touched, not {socket + 1}. {done}"

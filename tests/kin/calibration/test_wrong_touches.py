@@ -6,7 +6,7 @@ import pytest
 import kin
 from kin.calibration.fit import Touches
 from kin.calibration.fixtures import TouchBoard, TouchFixture
-from tests.kin.calibration.simulated import DEG, FINE, probed
+from tests.kin.calibration.simulated import DEG, FINE, probed, tip_error
 from tests.kin.calibration.test_fit import BAR, Case, pose
 
 COUNT = 20
@@ -108,6 +108,25 @@ def test_the_only_touch_of_a_board_is_not_blamed(ur5e):
     wrong = beside(case, model, errors, some, len(some) - 1, [0.0, 0.02, 0.0])
     found = kin.calibration.calibrate(case.robot, wrong.q, wrong.at, fixture, noise=FINE.noise)
     assert len(some) - 1 in found.kept
+
+
+@pytest.mark.parametrize(
+    ("cause", "mistake"),
+    [
+        ("sign", lambda q: q * np.where(np.arange(6) == 2, -1.0, 1.0)),
+        ("swap", lambda q: q[..., [0, 2, 1, 3, 4, 5]]),
+        ("zero", lambda q: q + np.where(np.arange(6) == 3, 15.0 * DEG, 0.0)),
+    ],
+)
+def test_readings_with_a_mistake_of_all_touches_are_corrected_for_the_table_found(ur5e, cause, mistake):
+    model, errors, touches = ur5e.simulated(30, COUNT)
+    found = kin.calibration.calibrate(ur5e.robot, mistake(touches.q), touches.at, BAR, noise=FINE.noise)
+    assert [(fault.touch, fault.cause) for fault in found.faults] == [(None, cause)]
+    assert ("correct yours too before you use it" in found.text) == (cause != "zero")
+    q = ur5e.test
+    true = model.chain.points(q, errors)
+    assert tip_error(true, kin.fk_positions(found.robot, found.corrected(mistake(q)))) < found.expected.bound
+    assert np.array_equal(found.corrected(mistake(q[3])), found.corrected(mistake(q))[3])
 
 
 @pytest.mark.parametrize(
