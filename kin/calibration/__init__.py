@@ -371,7 +371,7 @@ def _unseen(model: Model) -> tuple[str, ...]:
 
 
 def _advice(model: Model, expected: ExpectedError, count: int) -> str:
-    """The fixture that would show more, if this one does not show what matters; "" if it does."""
+    """The fixture that would show more, if this one does not show what matters; "" if it does, or none would."""
     if (
         expected.after < max(_POOR * expected.before, _FLOOR * expected.readings)
         or model.fixture.at_base is not None
@@ -390,6 +390,8 @@ def _advice(model: Model, expected: ExpectedError, count: int) -> str:
     test = workspace_poses(robot, _POSES, robot.floor)
     height, best, least = _table_of(robot), "", _CLEARLY_BETTER * expected.after
     for name, fixture in others.items():
+        if _same(fixture, model.fixture):
+            continue
         other = replace(model, fixture=fixture)
         scene = Scene(robot, fixture, height, proposed_poses(robot, fixture, height))
         offered = candidates(scene)
@@ -400,8 +402,13 @@ def _advice(model: Model, expected: ExpectedError, count: int) -> str:
         if after < least:
             best, least = name, after
     if not best:
-        return "More touches will hardly help: what is left is the noise of readings and contacts."
+        return ""
     return (
         f"This fixture does not show what matters for {robot.n} joints: {best}, touched as often, would bring "
         f"{millimetres(least)}."
     )
+
+
+def _same(a: TouchFixture, b: TouchFixture) -> bool:
+    """Whether two fixtures show the same."""
+    return a.plane == b.plane and np.array_equal(a.local, b.local) and np.array_equal(a.owner, b.owner)

@@ -83,6 +83,22 @@ def test_a_fixture_that_does_not_show_what_matters_is_said_before_the_first_touc
     assert better.expected.after < 0.75 * plan.expected.after
 
 
+SHEET = TouchFixture([TouchBoard.sheet("A4")])
+
+
+def test_the_fixture_that_is_used_is_not_recommended():
+    far = kin.pose_from_xyz_rpy([0.35, 0.0, 0.0])  # the same sheet nearer to the arm would show more
+    plan = kin.calibration.touch_postures("so101", SHEET, count=6, places=[far])
+    assert plan.expected.after > 0.35 * plan.expected.before
+    assert "sheet" not in plan.advice
+
+
+def test_few_touches_are_not_said_to_be_enough():
+    plan = kin.calibration.touch_postures("so101", SHEET, count=3)
+    assert plan.expected.after > 2.0 * plan.expected.readings
+    assert plan.advice == ""
+
+
 @pytest.mark.parametrize(
     ("given", "field"),
     [
