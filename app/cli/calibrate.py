@@ -8,6 +8,7 @@ import math
 import re
 from argparse import Namespace
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,14 @@ PRINTED, WAVE = 0.005, math.radians(0.5)
 TOUCHES = 20
 
 
+class Read(NamedTuple):
+    """Touches of a file: the place of each in it, joint values ``(k, n)``, and sockets ``(k,)`` from 0."""
+
+    places: list[str]
+    q: Array
+    sockets: Array
+
+
 def run(arguments: Namespace) -> int:
     """Propose touches, or fit the table; the exit code is 1 if touches contradict each other."""
     robot, fixture = mounted_robot_of(arguments), fixture_of(arguments)
@@ -52,27 +61,38 @@ def run(arguments: Namespace) -> int:
         wave=WAVE if arguments.waves else 0.0,
         keep_family=arguments.keep_family,
     )
-    if given is None or arguments.plan is not None:
-        height = None
-        if arguments.table is not None:
-            height = quantity(arguments.table, units_of(arguments).lengths, "--table")
-        plan = touch_postures(
-            robot,
-            fixture,
-            arguments.plan or TOUCHES,
-            places=_places(arguments),
-            table=height,
-            done=None if given is None else (given[1], given[2]),
-            tolerances=tolerances,
-            noise=noise,
-        )
-        return _print_plan(robot, plan, arguments)
-    places, q, sockets = given
     try:
-        found = calibrate(robot, q, sockets, fixture, tolerances=tolerances, noise=noise)
+        if given is None or arguments.plan is not None:
+            done = None if given is None else (given.q, given.sockets)
+            return _print_plan(robot, _proposed(robot, fixture, done, tolerances, noise, arguments), arguments)
+        found = calibrate(robot, given.q, given.sockets, fixture, tolerances=tolerances, noise=noise)
     except InputError as error:
-        raise _at_line(error, places, fixture) from None
-    return _print_fit(found, sockets, arguments)
+        raise _in_the_file(error, given, fixture) from None
+    return _print_fit(found, given.sockets, arguments)
+
+
+def _proposed(
+    robot: Robot,
+    fixture: TouchFixture,
+    done: tuple[Array, Array] | None,
+    tolerances: TableTolerances,
+    noise: TouchNoise,
+    arguments: Namespace,
+) -> TouchPlan:
+    """The plan of ``--plan``."""
+    height = None
+    if arguments.table is not None:
+        height = quantity(arguments.table, units_of(arguments).lengths, "--table")
+    return touch_postures(
+        robot,
+        fixture,
+        arguments.plan or TOUCHES,
+        places=_places(arguments),
+        table=height,
+        done=done,
+        tolerances=tolerances,
+        noise=noise,
+    )
 
 
 def fixture_of(arguments: Namespace) -> TouchFixture:
@@ -99,31 +119,31 @@ def _columns(robot: Robot) -> list[str]:
     return ["socket", *(f"q{i + 1}" for i in range(robot.n))]
 
 
-def _touches(robot: Robot, file: str) -> tuple[list[str], Array, Array]:
-    """The places of the rows of a file, joint values ``(k, n)``, and sockets ``(k,)`` from 0."""
+def _touches(robot: Robot, file: str) -> Read:
+    """The touches of a file."""
     with opened_source(file, "TOUCHES") as opened:
         rows = opened.numbers(_columns(robot))
     values = np.array([row for _, row in rows]).reshape(-1, robot.n + 1)
     read = ~np.isnan(values).all(axis=1)
-    return (
+    return Read(
         [place for (place, _), kept in zip(rows, read, strict=True) if kept],
         values[read, 1:],
         values[read, 0] - 1.0,
     )
 
 
-def _at_line(error: InputError, places: list[str], fixture: TouchFixture) -> InputError:
+def _in_the_file(error: InputError, given: Read | None, fixture: TouchFixture) -> InputError:
     """The error with the line of the file in which a touch is; there, sockets are counted from 1."""
-    match = re.fullmatch(r"(q|sockets)\[(\d+)\](?:\[(\d+)\])?", error.field)
-    if match is None:
+    match = re.fullmatch(r"(q|done\[0\]|sockets|done\[1\])\[(\d+)\](?:\[(\d+)\])?", error.field)
+    if match is None or given is None:
         return error
-    place = places[int(match[2])]
-    if match[1] == "q":
-        return error.renamed(f"{place}, q{int(match[3]) + 1}")
+    k = int(match[2])
+    if match[3] is not None:
+        return error.renamed(f"{given.places[k]}, q{int(match[3]) + 1}")
     valid = f"a socket of the fixture, 1 to {len(fixture.local)}" + (
         ", or 0 for its plane" if fixture.plane else ""
     )
-    return InputError(f"{place}, socket", float(error.value) + 1.0, valid)
+    return InputError(f"{given.places[k]}, socket", float(given.sockets[k]) + 1.0, valid)
 
 
 def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:

@@ -89,8 +89,7 @@ def calibrate(
 
     Raises:
         InputError: arrays of another shape, values outside the limits, a socket that the fixture does not have,
-        too
-            few touches, or all in one posture. Contradictions are no error.
+            too few touches, or all in one posture. Contradictions are no error.
 
     Examples:
         >>> import kin
@@ -141,7 +140,8 @@ def touch_postures(
         Configurations free of collisions with the arm itself and the table.
 
     Raises:
-        InputError: other than one place for each board, too many touches, or a socket that the arm cannot touch.
+        InputError: other than one place for each board, too many touches, a socket that the arm cannot touch, or
+            touches made already that are outside the limits or of another socket.
 
     Examples:
         >>> import kin
@@ -177,8 +177,7 @@ def _made(model: Model, done: tuple[ArrayLike, ArrayLike] | None) -> Touches:
     """The touches that were made already."""
     if done is None:
         return Touches(np.empty((0, model.robot.n)), np.empty(0, np.int64))
-    made = finite_array("done[0]", done[0], (None, model.robot.n))
-    return Touches(made, model.fixture.check_sockets(done[1], len(made)))
+    return _readings(model, done[0], done[1], ("done[0]", "done[1]"))
 
 
 def _table_of(robot: Robot) -> float:
@@ -223,39 +222,42 @@ def _of_readings(model: Model, test: Array) -> float:
 
 
 def _checked_touches(model: Model, q: ArrayLike, sockets: ArrayLike) -> Touches:
-    """The touches, if they make sense at all.
+    """The touches, if they are enough for a fit.
 
     Raises:
         InputError: naming the touch, the value and what is valid.
     """
+    touches, n = _readings(model, q, sockets, ("q", "sockets")), model.robot.n
+    if len(touches) <= n:
+        why = f"each gives three numbers, and about {4 * n - 3} numbers of the table can be seen"
+        raise InputError("q", f"shape {touches.q.shape}", f"{n + 1} to {MOST_TOUCHES} touches ({why}): (k, {n})")
+    if float(np.ptp(touches.q, axis=0).max()) < _ONE_POSTURE:
+        raise InputError("q", "touches in one posture", "postures that differ by 5° in some joint or more")
+    return touches
+
+
+def _readings(model: Model, q: ArrayLike, sockets: ArrayLike, names: tuple[str, str]) -> Touches:
+    """Touches, if each makes sense: within the limits of the joints, and of a socket of the fixture.
+
+    Raises:
+        InputError: naming the touch by the names of the two arguments, the value and what is valid.
+    """
     robot = model.robot
-    values = finite_array("q", q, (None, robot.n))
-    if values.ndim != 2 or not robot.n < len(values) <= MOST_TOUCHES:
-        seen = 4 * robot.n - 3
-        why = f"each gives three numbers, and about {seen} numbers of the table can be seen"
-        raise InputError(
-            "q", f"shape {values.shape}", f"{robot.n + 1} to {MOST_TOUCHES} touches ({why}): (k, {robot.n})"
-        )
-    at = model.fixture.check_sockets(sockets, len(values))
-    slack = (
-        3.0
-        * model.sigma[
-            [model.chain.first[i] + (not turns) for i, turns in zip(robot.joint_rows, robot.revolute, strict=True)]
-        ]
-    )
-    slack = slack + 4.0 * model.noise.joints(robot)
+    values = finite_array(names[0], q, (None, robot.n))
+    if values.ndim != 2 or len(values) > MOST_TOUCHES:
+        raise InputError(names[0], f"shape {values.shape}", f"at most {MOST_TOUCHES} touches: (k, {robot.n})")
+    at = model.fixture.check_sockets(sockets, len(values), names[1])
+    turning = robot.revolute
+    first = [model.chain.first[i] + (not turns) for i, turns in zip(robot.joint_rows, turning, strict=True)]
+    slack = 3.0 * model.sigma[first] + 4.0 * model.noise.joints(robot)
     outside = (values < robot.lower - slack) | (values > robot.upper + slack)
     if outside.any():
         k, i = map(int, np.argwhere(outside)[0])
         low, high = float(robot.lower[i]), float(robot.upper[i])
         expected = f"{robot.joints[i].name} within its limits, {low:.4g} to {high:.4g}"
-        turned = values.copy()
-        turned[:, robot.revolute] = np.radians(turned[:, robot.revolute])
-        if robot.revolute[i] and not ((turned < robot.lower - slack) | (turned > robot.upper + slack)).any():
+        if turning[i] and (np.abs(values[:, turning]) > 2.0 * math.pi).any():
             expected += "; are these degrees? Joint values are radians"
-        raise InputError(f"q[{k}][{i}]", float(values[k, i]), expected)
-    if float(np.ptp(values, axis=0).max()) < _ONE_POSTURE:
-        raise InputError("q", "touches in one posture", "postures that differ by 5° in some joint or more")
+        raise InputError(f"{names[0]}[{k}][{i}]", float(values[k, i]), expected)
     return Touches(values, at)
 
 

@@ -174,19 +174,19 @@ class TouchFixture:
             s[-3:] = (_ANYWHERE[1], _ANYWHERE[1], _ANYWHERE[0])
         return s
 
-    def check_sockets(self, sockets: ArrayLike, count: int) -> Whole:
+    def check_sockets(self, sockets: ArrayLike, count: int, field: str = "sockets") -> Whole:
         """Numbers of what was touched ``(count,)``.
 
         Raises:
             InputError: naming the touch, for a socket that the fixture does not have.
         """
-        given = finite_array("sockets", sockets, (None,))
+        given = finite_array(field, sockets, (None,))
         if given.shape != (count,):
-            raise InputError("sockets", f"shape {given.shape}", f"one for each of {count} touches")
+            raise InputError(field, f"shape {given.shape}", f"one for each of {count} touches")
         for k, each in enumerate(given.tolist()):
             if not each.is_integer() or not (0 <= each < len(self.local) or (self.plane and each == PLANE)):
                 valid = f"a socket of the fixture, 0 to {len(self.local) - 1}"
-                raise InputError(f"sockets[{k}]", each, valid + (", or −1 for its plane" if self.plane else ""))
+                raise InputError(f"{field}[{k}]", each, valid + (", or −1 for its plane" if self.plane else ""))
         return given.astype(np.int64)
 
 

@@ -100,8 +100,9 @@ def test_what_is_wrong_is_said_with_its_line(
     rows[row][column] = value
     file = tmp_path / "bad.csv"
     file.write_text("\n".join(",".join(row) for row in rows))
-    assert main(["calibrate", "ur5e", str(file), "--bar", "150"]) == 2
-    assert said in capsys.readouterr().err
+    for more in ([], ["--plan", "3"]):
+        assert main(["calibrate", "ur5e", str(file), "--bar", "150", *more]) == 2
+        assert said in capsys.readouterr().err
 
 
 def test_options_that_do_not_fit_are_refused(capsys, tmp_path: Path) -> None:

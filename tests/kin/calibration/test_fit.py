@@ -293,6 +293,22 @@ def test_bad_input_is_named(ur5e, change, field, expected):
         kin.calibration.calibrate(ur5e.robot, *change(touches.q, touches.at), BAR)
     assert caught.value.field.startswith(field)
     assert expected in caught.value.expected
+    if field not in ("q", "sockets"):  # touches that were made before a plan are checked alike
+        with pytest.raises(kin.InputError) as planned:
+            kin.calibration.touch_postures(ur5e.robot, BAR, 3, done=change(touches.q, touches.at))
+        assert planned.value.field == caught.value.field.replace("q", "done[0]").replace("sockets", "done[1]")
+        assert planned.value.expected == caught.value.expected
+
+
+@pytest.mark.parametrize(("reading", "asked"), [(2.6, False), (-95.0, True)])
+def test_readings_outside_the_limits_are_called_degrees_only_beyond_a_turn(so101, reading, asked):
+    _, _, touches = so101.simulated(18)
+    q = touches.q.copy()
+    q[4, 1] = reading
+    with pytest.raises(kin.InputError) as caught:
+        kin.calibration.calibrate(so101.robot, q, touches.at, SHEET)
+    assert caught.value.field == "q[4][1]"
+    assert ("are these degrees?" in caught.value.expected) == asked
 
 
 def test_exchanged_columns_are_found(ur5e):

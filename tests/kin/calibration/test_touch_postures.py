@@ -106,7 +106,8 @@ def test_few_touches_are_not_said_to_be_enough():
         ({"places": []}, "places"),
         ({"count": 0}, "count"),
         ({"table": np.inf}, "table"),
-        ({"done": (np.zeros((2, 6)), [0, 5])}, "sockets[1]"),
+        ({"done": (np.zeros((2, 6)), [0, 5])}, "done[1][1]"),
+        ({"done": (np.zeros((2, 1, 6)), [0, 1])}, "done[0]"),
     ],
 )
 def test_bad_input_is_named(given, field):
