@@ -17,7 +17,7 @@ from app.cli.pipes.source import opened_source
 from app.cli.terminal import Notation, mounted_robot_of, pose_of, print_json, quantity, table, units_of
 from app.exports.touch import report, sheet_svg
 from app.shared.answers.calibration import calibration_answer, touch_plan_answer
-from kin import InputError, Robot, robot_to_toml
+from kin import InputError, Robot, builtin_robots, robot_to_toml
 from kin.calibration import (
     Calibration,
     TableTolerances,
@@ -33,6 +33,8 @@ from kin.transforms import Array
 
 PRINTED, WAVE = 0.005, math.radians(0.5)
 TOUCHES = 20
+SOURCE = "Calibrated by touching. Nominal table: "
+LONGEST_SOURCE = 4000  # characters that robot files may have there
 
 
 class Read(NamedTuple):
@@ -67,7 +69,7 @@ def run(arguments: Namespace) -> int:
             return _print_plan(robot, _proposed(robot, fixture, done, tolerances, noise, arguments), arguments)
         found = calibrate(robot, given.q, given.sockets, fixture, tolerances=tolerances, noise=noise)
     except InputError as error:
-        raise _in_the_file(error, given, fixture) from None
+        raise _as_typed(error, given, fixture) from None
     return _print_fit(found, given.sockets, arguments)
 
 
@@ -132,8 +134,12 @@ def _touches(robot: Robot, file: str) -> Read:
     )
 
 
-def _in_the_file(error: InputError, given: Read | None, fixture: TouchFixture) -> InputError:
-    """The error with the line of the file in which a touch is; there, sockets are counted from 1."""
+def _as_typed(error: InputError, given: Read | None, fixture: TouchFixture) -> InputError:
+    """The error with the line of the file in which a touch is, or the option; sockets are counted from 1 here."""
+    where = re.fullmatch(r"'(the plane|socket (\d+)( at .*))'", error.value)
+    if where is not None:
+        what = where[1] if where[2] is None else f"socket {int(where[2]) + 1}{where[3]}"
+        return InputError("--place, --table", what, error.expected)
     match = re.fullmatch(r"(q|done\[0\]|sockets|done\[1\])\[(\d+)\](?:\[(\d+)\])?", error.field)
     if match is None or given is None:
         return error
@@ -176,6 +182,7 @@ def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
 
 def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
     """Print what was found, and write the arm and the report."""
+    found = replace(found, robot=_as_own(found.robot))
     if arguments.output is not None:
         write_file(arguments.output, robot_to_toml(found.robot))
     if arguments.html is not None:
@@ -194,3 +201,10 @@ def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
             note = "" if k in found.kept else "  left out"
             print(f"{k + 1:5d}  {millimetres(miss)}{note}")
     return 1 if found.faults or found.noise >= 2.0 else 0
+
+
+def _as_own(robot: Robot) -> Robot:
+    """The arm found, with a source of its own, and an id that a folder of robot files may have."""
+    robot_id = f"{robot.id}-calibrated" if robot.id in builtin_robots() else robot.id
+    source = robot.source if robot.source.startswith(SOURCE) else SOURCE + robot.source
+    return replace(robot, id=robot_id, source=source[:LONGEST_SOURCE])

@@ -159,7 +159,8 @@ def touch_postures(
     poses = _poses(robot, fixture, places, height)
     scene = Scene(robot, fixture, height, poses)
     offered = candidates(scene, whole_number("seed", seed, 0, 2**31))
-    _check_offered(scene, offered)
+    where_to = "table" if places is None and fixture.at_base is None else "places"
+    _check_offered(scene, offered, where_to)
     before = _made(model, done)
     whole = Touches(np.vstack([before.q, offered.q]), np.concatenate([before.at, offered.at]))
     test = workspace_poses(robot, _POSES, height)
@@ -196,13 +197,17 @@ def _poses(robot: Robot, fixture: TouchFixture, places: Sequence[ArrayLike] | No
     return np.array(poses)
 
 
-def _check_offered(scene: Scene, offered: Touches) -> None:
-    """Whether the arm can touch every socket."""
+def _check_offered(scene: Scene, offered: Touches, field: str) -> None:
+    """Whether the arm can touch every socket; `field` is what to change if not."""
     wanted = [*range(len(scene.sockets)), *([PLANE] if scene.fixture.plane else [])]
     for j in wanted:
         if not (offered.at == j).any():
             what = "the plane" if j == PLANE else f"socket {j} at {np.round(scene.sockets[j], 3).tolist()} m"
-            raise InputError("places", what, "places that the arm can touch without collisions, tool z axis down")
+            expected = (
+                f"places, and a height of the table (here {scene.table:.4g} m), at which the arm can touch it "
+                "without collisions, tool z axis down"
+            )
+            raise InputError(field, what, expected)
 
 
 def _predicted(model: Model, parts: Pieces, chosen: list[int], test: Array) -> ExpectedError:

@@ -45,6 +45,8 @@ def test_a_fit_is_printed_and_written(touches: Path, tmp_path: Path, capsys) -> 
     assert "touch  off by" in out
     found = kin.load_robot(arm)
     assert found.nominal is not None
+    assert found.id == "ur5e-calibrated"
+    assert found.source == f"Calibrated by touching. Nominal table: {kin.get_robot('ur5e').source}"
     q = found.random_q(np.random.default_rng(1), 20)
     assert np.abs(kin.fk_positions(found, q) - kin.fk_positions("ur5e", q)).max() < 1e-5
     html = page.read_text(encoding="utf-8")
@@ -54,6 +56,9 @@ def test_a_fit_is_printed_and_written(touches: Path, tmp_path: Path, capsys) -> 
     answer = json.loads(capsys.readouterr().out)
     assert len(answer["misses"]) == 10
     assert kin.robot_from_dict(answer["robot"]).nominal is not None
+    assert main(["calibrate", str(arm), str(touches), "--bar", "150", "-o", str(arm)]) == 0
+    again = kin.load_robot(arm)
+    assert (again.id, again.source) == (found.id, found.source)
 
 
 def test_axes_of_a_calibrated_table_are_meant_as_they_are() -> None:
@@ -112,6 +117,14 @@ def test_options_that_do_not_fit_are_refused(capsys, tmp_path: Path) -> None:
     assert "--place" in capsys.readouterr().err
     assert main(["calibrate", "ur5e", "--pin", "--print", str(tmp_path / "a.svg")]) == 2
     assert "--sheet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("place", [[], ["--place", "270:0:50"]])
+def test_a_socket_that_cannot_be_touched_is_said_with_the_height_of_the_table(capsys, place: list[str]) -> None:
+    assert main(["calibrate", "scara", "--pin", *place]) == 2
+    said = capsys.readouterr().err
+    assert "--table: got 'socket 1 at [0.2" in said
+    assert "a height of the table (here 0 m)" in said
 
 
 @pytest.mark.parametrize(("paper", "width", "height"), [("A5", 148, 210), ("A4", 210, 297), ("A3", 297, 420)])
