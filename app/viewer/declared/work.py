@@ -169,8 +169,9 @@ class Runner:
         last = self.results.get(work.key, NOTHING)
         if isinstance(job.task, Subscription):
             task = job.task
-            error = task.future.exception() if task.finished else None
-            now = Result(task.latest, task.done, task.total, task.finished, error)
+            finished = task.finished  # first: what is read after the end is whole
+            error = task.future.exception() if finished else None
+            now = Result(task.latest, task.done, task.total, finished, error)
             seen = last.done, last.total, last.finished
             if now.value is not last.value or (now.done, now.total, now.finished) != seen:
                 self._set(work.key, now)

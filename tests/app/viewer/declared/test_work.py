@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bare_page import STORE, bare_page
 
-from app.shared.computations import ComputationCache, SharedComputation
+from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.viewer.arm import Arm
 from app.viewer.declared.facts import ArmReads, Facts
 from app.viewer.declared.feature import DeclaredFeature
@@ -146,6 +146,37 @@ def test_a_shared_computation_tells_its_progress_and_is_left() -> None:
     two.go_on([], 0.0)
     assert "other" not in cache, "nobody waits for it"
     goes_on.set()
+
+
+class Ends(Subscription[str]):
+    """A subscription whose computation ends, with the result or with an error, while its progress is read."""
+
+    def __init__(self, error: Exception | None) -> None:
+        self.computation: SharedComputation[str] = SharedComputation("key")
+        self.computation.latest = "half"
+        self.error = error
+        super().__init__(self.computation, lambda: None)
+
+    @property
+    def total(self) -> int:
+        if not self.finished:
+            if self.error is None:
+                self.computation.latest = "whole"
+                self.future.set_result("whole")
+            else:
+                self.future.set_exception(self.error)
+        return 2
+
+
+def test_a_computation_that_ends_while_it_is_looked_at_is_seen_whole() -> None:
+    failed = ValueError("why")
+    for error, value in ((None, "whole"), (failed, "half")):
+        one, ends = runner(), Ends(error)
+        declared = [work(lambda ends=ends: ends, poll=0.5)]
+        while one.go_on(declared, 0.0)[0] is not None:
+            pass
+        found = one.results["one"]
+        assert (found.value, found.finished, found.error) == (value, True, error)
 
 
 def test_a_motion_gets_the_seconds_that_have_passed_but_no_long_pause() -> None:
