@@ -19,6 +19,7 @@ from app.viewer.session.events import (
     RULES,
     SHORT_PAUSE,
     Rule,
+    belongs_before,
     name_of,
     pause_within,
 )
@@ -149,3 +150,22 @@ def test_the_name_of_a_message_is_that_of_its_event() -> None:
 )
 def test_how_long_a_step_may_pause(gesture: tuple[object, ...], value: object, pause: float) -> None:
     assert pause_within(gesture, value) == pause
+
+
+@pytest.mark.parametrize(
+    ("gesture", "expected"),
+    [
+        (("feature", "robot", ("meshes", 3)), True),
+        (("feature", "learn", ("done", ())), True),
+        (("feature", "workspace", ("capability", ("done", ()))), True),
+        (("feature", "robot", ("compare", ("done", ()))), True),
+        (("feature", "workspace", ("capability", "start")), False),
+        (("feature", "workspace", "done"), False),
+        (("feature", "robot", ("cell", 2, "a")), False),
+        (("joint", "ur5", ("done", ())), False),
+    ],
+)
+def test_the_end_of_work_completes_what_the_visitor_did_also_in_a_part_of_a_tab(
+    gesture: tuple[object, ...], expected: bool
+) -> None:
+    assert belongs_before(gesture) is expected
