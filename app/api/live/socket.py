@@ -11,6 +11,7 @@ import contextlib
 import logging
 from collections import deque
 from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol
 
 from fastapi import WebSocket
@@ -42,8 +43,8 @@ LONGEST_NAME, LONGEST_SESSION = 40, 64  # characters
 class Tries(Protocol):
     """How often a client may try codes."""
 
-    async def trying(self, client: str) -> None:
-        """One try begins; raises 429."""
+    def trying(self, client: str) -> AbstractAsyncContextManager[None]:
+        """The time of one try; raises 429."""
 
     def wrong(self, client: str) -> None:
         """The code was wrong; raises 429 if there were too many."""
@@ -72,13 +73,13 @@ async def live(visitor: WebSocket, code: str) -> None:
 
 async def _find(lines: Lines, tries: Tries, client: str, code: str) -> Line:
     """The line with a code; raises `ProblemError`: 404, or 429 after many wrong codes."""
-    await tries.trying(client)
-    code = read_code(code[:LONGEST])
-    line = lines.find(code)
-    if line is not None:
-        return line
-    if code not in RESERVED:  # its page is not open yet
-        tries.wrong(client)
+    async with tries.trying(client):
+        code = read_code(code[:LONGEST])
+        line = lines.find(code)
+        if line is not None:
+            return line
+        if code not in RESERVED:  # its page is not open yet
+            tries.wrong(client)
     expected = "the code of an open page" if is_code(code) else "8 letters and digits, such as K7QF-2M4A"
     error = FieldError(field="code", value=show(show_code(code)), expected=expected)
     hint = "Press Connect a program in the tab Program of the page; the code is there."

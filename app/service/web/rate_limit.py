@@ -25,10 +25,10 @@ class TokenBucket:
         self._clock = clock
         self._tokens: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
-    def wait(self, client: str) -> float:
-        """Seconds until this client has a token; 0 if it has one now."""
+    def wait(self, client: str, number: int = 1) -> float:
+        """Seconds until this client has so many tokens; 0 if it has them now."""
         tokens, _ = self._now(client)
-        return max(0.0, (1.0 - tokens) / self._rate)
+        return max(0.0, (number - tokens) / self._rate)
 
     def take(self, client: str) -> None:
         """Use one token."""

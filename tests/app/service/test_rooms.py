@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
 import re
 import threading
+from collections import Counter
 
+import httpx2
 import pytest
 from fastapi.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
@@ -235,6 +238,32 @@ def test_guessing_codes_is_slow_and_does_not_keep_a_class_out(make, monkeypatch)
     statuses = [join(make(), "AAAA-AAA").status_code for _ in range(8)]
     assert statuses == [404] * 5 + [429] * 3
     assert join(make(), code).status_code == 303
+
+
+def join_at_once(app, code, count):
+    """The statuses of so many students of one address who join at the same time."""
+
+    async def run():
+        transport = httpx2.ASGITransport(app)
+        async with httpx2.AsyncClient(transport=transport, base_url="http://school.example") as client:
+            forms = [{"code": code, "alias": f"Ada {k}"} for k in range(count)]
+            return await asyncio.gather(*(client.post("/room/join", data=form) for form in forms))
+
+    return Counter(answer.status_code for answer in asyncio.run(run()))
+
+
+def test_codes_that_are_tried_at_once_are_limited_like_one_after_the_other(make, monkeypatch):
+    monkeypatch.setattr(limits, "SLOW", 0.05)
+    monkeypatch.setattr(limits, "WRONG", 5)
+    teacher = make()
+    code = open_room(teacher)
+    hub, looked = teacher.app.state.classroom, []
+    find = hub.join
+    monkeypatch.setattr(hub, "join", lambda *given: looked.append(given) or find(*given))
+    assert join_at_once(teacher.app, code, 10) == {303: 10}, "right codes neither count nor pause"
+    looked.clear()
+    assert join_at_once(teacher.app, "AAAA-AAA", 100) == {404: limits.WRONG, 429: 100 - limits.WRONG}
+    assert len(looked) == limits.WRONG + limits.SLOW_AT_ONCE
 
 
 def test_one_address_cannot_take_all_rooms(make):

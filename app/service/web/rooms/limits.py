@@ -2,10 +2,16 @@
 
 A class comes through one address, so right codes always count, and wrong ones have a generous limit. Above it, and
 while wrong codes come in from everywhere, each try takes a second and only a few are made at a time: a class can
-still join, and a program that guesses needs centuries.
+still join, and a program that guesses needs centuries. Codes that are tried at the same time count as if one came
+after the other: where as many are under way as may still be wrong, others wait until one of them is decided.
 """
 
 from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 from app.service.web.rate_limit import SlowTries, TokenBucket, too_many
 
@@ -27,16 +33,31 @@ class Limits:
         self._rooms = TokenBucket(1.0 / ROOMS_EVERY, ROOMS)
         self._seats = TokenBucket(1.0 / SEATS_EVERY, SEATS)
         self._slow = SlowTries(SLOW_AT_ONCE)
+        self._under_way: Counter[str] = Counter()  # tries without a pause, by client
+        self._decided = asyncio.Event()  # the next of them
 
-    async def trying(self, client: str) -> None:
-        """One try of a code begins, after a pause if many were wrong; raises 429."""
-        wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
+    @asynccontextmanager
+    async def trying(self, client: str) -> AsyncIterator[None]:
+        """The time of one try of a code, after a pause if many were wrong; raises 429. `wrong` is called within."""
+        while (wait := self._wait(client)) == 0.0 and self._may_all_be_wrong(client):
+            await self._decided.wait()
         if wait > 0.0:
             await self._slow.pause(client, SLOW, too_many(TOO_MANY, wait))
+            yield
+            return
+        self._under_way[client] += 1
+        try:
+            yield
+        finally:
+            self._under_way[client] -= 1
+            if not self._under_way[client]:
+                del self._under_way[client]
+            self._decided.set()
+            self._decided = asyncio.Event()
 
     def wrong(self, client: str) -> None:
         """A code was wrong; raises 429 if there were too many."""
-        wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
+        wait = self._wait(client)
         if wait > 0.0:
             raise too_many(TOO_MANY, wait)
         self._wrong.take(client)
@@ -54,6 +75,15 @@ class Limits:
     def sat(self, client: str) -> None:
         """A seat was taken. Wrong codes take none: who guesses must not keep the class at the same address out."""
         self._seats.take(client)
+
+    def _wait(self, client: str) -> float:
+        """Seconds until another code may be wrong."""
+        return max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
+
+    def _may_all_be_wrong(self, client: str) -> bool:
+        """Whether the tries under way use all that may be wrong."""
+        mine, all_of = self._under_way[client], self._under_way.total()
+        return max(self._wrong.wait(client, 1 + mine), self._wrong_all.wait(_ALL, 1 + all_of)) > 0.0
 
     def _ask(self, bucket: TokenBucket, client: str, detail: str) -> None:
         wait = bucket.wait(client)

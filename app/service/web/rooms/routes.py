@@ -147,14 +147,14 @@ class _Pages:
         again = partial(room_page, request, code=code, alias=alias, may_open=may_open(request.scope))
         try:
             known = await self._ticket(request)
-            await self._limits.trying(client)
-            self._limits.sitting(client)
-            try:
-                ticket = await run_in_threadpool(self._hub.join, code, alias, known)
-            except UnknownRoomError:
-                self._limits.wrong(client)
-                raise
-            self._limits.sat(client)
+            async with self._limits.trying(client):
+                self._limits.sitting(client)
+                try:
+                    ticket = await run_in_threadpool(self._hub.join, code, alias, known)
+                except UnknownRoomError:
+                    self._limits.wrong(client)
+                    raise
+                self._limits.sat(client)
             room = await run_in_threadpool(self._hub.rooms.find, ticket)
         except RefusedError as error:
             return again(
