@@ -80,8 +80,9 @@ def solver_of(robot: Robot) -> Solver:
         return Solver("", None, error.expected)
     form = closed_form_of(robot)
     assert form is not None
-    # Without its head: names of joints may be anything, also the end of a script.
-    return Solver(text[text.index(f"const {_NAME} = ") :], _about(robot, form))
+    # Without its head, a comment with names of the arm and its joints, which may be anything but a line break: the
+    # end of a script, or the words that the code begins with.
+    return Solver(text[text.index(f"\nconst {_NAME} = ") + 1 :], _about(robot, form))
 
 
 def _about(robot: Robot, form: ClosedForm) -> dict[str, Any]:

@@ -125,17 +125,26 @@ def test_the_bar_of_the_redundancy_parameter_is_that_of_the_product(robot_id, tm
         assert seed is not None
 
 
-def test_names_of_joints_are_no_scripts():
-    bad = "</script><!--<script>{a1}"
+@pytest.mark.parametrize(
+    "bad",
+    [
+        "</script><!--<script>{a1}",
+        "const kernels = 0</script><script>window.evil=1</script>",
+        "\nconst kernels = 0</script><script>window.evil=1</script>",
+    ],
+)
+def test_names_of_joints_are_no_scripts(bad):
     robot = kin.get_robot("planar2r")
     joints = tuple(replace(joint, name=f"{bad}{i}") for i, joint in enumerate(robot.joints))
     solver = solver_of(replace(robot, name=bad, rows=joints))
     assert solver.about is not None
+    assert solver.script == solver_of(robot).script
     assert "<!--" not in solver.script
     assert "</" not in solver.script
     assert bad in solver.about["words"]["needs"][0][0]
     page = web_page(SavedArm(replace(robot, name=bad, rows=joints), robot.q_home))
     assert bad not in page
+    assert len(re.findall("</script", page, re.IGNORECASE)) == 4  # data, kernels, three.js, and the page's own
 
 
 def test_an_arm_whose_kernels_cannot_be_generated_says_why_and_keeps_its_saved_postures():
