@@ -67,7 +67,16 @@ class TouchBoard:
 
     @classmethod
     def pin(cls) -> TouchBoard:
-        """One socket, or the point of a pin."""
+        """One socket, or the point of a pin.
+
+        Returns:
+            A board whose frame is in the socket.
+
+        Examples:
+            >>> import kin
+            >>> kin.calibration.TouchBoard.pin().sockets
+            array([[0., 0., 0.]])
+        """
         return cls(np.zeros((1, 3)))
 
     @classmethod
@@ -78,8 +87,17 @@ class TouchBoard:
             length: their distance in metres. With 50 mm and a print error of 0.1 mm, the scale of an arm is known
                 to 0.3 % only.
 
+        Returns:
+            A board with its frame in the middle and the sockets on the y axis.
+
         Raises:
             InputError: a length that is not from 10 mm to 2 m.
+
+        Examples:
+            >>> import kin
+            >>> kin.calibration.TouchBoard.bar(0.2).sockets
+            array([[ 0. , -0.1,  0. ],
+                   [ 0. ,  0.1,  0. ]])
         """
         if not 0.01 <= finite_number("length", length) <= 2.0:
             raise InputError("length", length, "metres from 0.01 to 2")
@@ -95,8 +113,17 @@ class TouchBoard:
         Args:
             paper: "A5", "A4" or "A3".
 
+        Returns:
+            A board whose sockets are the crosses.
+
         Raises:
             InputError: another paper.
+
+        Examples:
+            >>> import kin
+            >>> board = kin.calibration.TouchBoard.sheet("A5")
+            >>> board.sockets.shape, board.contact
+            ((6, 3), 0.0005)
         """
         if paper not in PAPER:
             raise InputError("paper", paper, "one of " + ", ".join(PAPER))
@@ -157,12 +184,38 @@ class TouchFixture:
         return 7 * len(self.boards) + 3 * self.plane
 
     def contacts(self, at: Whole, usual: float) -> Array:
-        """Standard deviation of each contact ``(k,)`` in metres; `usual` is that of a socket without its own."""
+        """Standard deviation of each contact, in each direction.
+
+        Args:
+            at: ``(k,)`` what was touched: the number of a socket of the fixture from 0, or −1 for its plane.
+            usual: standard deviation of a contact in metres, for the plane and for boards that state none or a
+                smaller one.
+
+        Returns:
+            ``(k,)`` metres.
+
+        Examples:
+            >>> import kin, numpy as np
+            >>> fixture = kin.calibration.TouchFixture([kin.calibration.TouchBoard.sheet()], plane=True)
+            >>> fixture.contacts(np.array([0, 5, -1]), 0.0001)
+            array([0.0005, 0.0005, 0.0001])
+        """
         own = [usual if board.contact is None else max(board.contact, usual) for board in self.boards]
         return np.where(at == PLANE, usual, np.array(own)[self.owner[np.maximum(at, 0)]])
 
     def sigma(self) -> Array:
-        """Standard deviations of the unknowns before anything is touched, 0 for those that do not count."""
+        """Standard deviations of the unknowns before anything is touched.
+
+        Returns:
+            ``(size,)`` of each board its place (three, metres), its turn (three, radians) and its scale (a share);
+            at the end of the plane two angles (radians) and its height (metres). 0 for what does not count: a
+            board with one socket has neither turn nor scale.
+
+        Examples:
+            >>> import kin
+            >>> kin.calibration.TouchFixture([kin.calibration.TouchBoard.bar(0.2)]).sigma().tolist()
+            [1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 0.001]
+        """
         s = np.zeros(self.size)
         shift, turn = _ANYWHERE if self.at_base is None else _MARKED
         for b, board in enumerate(self.boards):
@@ -175,10 +228,27 @@ class TouchFixture:
         return s
 
     def check_sockets(self, sockets: ArrayLike, count: int, field: str = "sockets") -> Whole:
-        """Numbers of what was touched ``(count,)``.
+        """Numbers of what was touched, if the fixture has them.
+
+        Args:
+            sockets: ``(count,)`` the number of a socket of the fixture from 0, or −1 for its plane.
+            count: how many touches there are.
+            field: what messages call them.
+
+        Returns:
+            ``(count,)`` the same as whole numbers.
 
         Raises:
-            InputError: naming the touch, for a socket that the fixture does not have.
+            InputError: another shape; naming the touch, a socket or a plane that the fixture does not have.
+
+        Examples:
+            >>> import kin
+            >>> bar = kin.calibration.TouchFixture([kin.calibration.TouchBoard.bar()])
+            >>> bar.check_sockets([0, 1, 1], 3)
+            array([0, 1, 1])
+            >>> bar.check_sockets([0, 2, 1], 3)
+            Traceback (most recent call last):
+            kin.errors.InputError: sockets[1]: got 2.0, expected a socket of the fixture, 0 to 1
         """
         given = finite_array(field, sockets, (None,))
         if given.shape != (count,):

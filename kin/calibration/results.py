@@ -138,6 +138,19 @@ class Calibration:
 
         Raises:
             InputError: q has another number of joints, or values that are not finite.
+
+        Examples:
+            The zero of an elbow is off by 0.02 rad. It is seen from the eight postures that touch one pin:
+
+            >>> import dataclasses, kin, numpy as np
+            >>> ur5 = kin.get_robot("ur5")
+            >>> arm = dataclasses.replace(ur5, motors=(kin.motors.Motor("elbow", 3),))
+            >>> q = kin.ik_branches(ur5, kin.fk(ur5, ur5.q_home))
+            >>> readings = q - [0, 0, 0.02, 0, 0, 0]
+            >>> pin = kin.calibration.TouchFixture([kin.calibration.TouchBoard.pin()])
+            >>> found = kin.calibration.calibrate(arm, readings, [0] * len(q), pin)
+            >>> bool(np.abs(found.corrected(readings) - q).max() < 0.001)
+            True
         """
         q = self.nominal.check_q(q)
         names = [joint.name for joint in self.nominal.joints]

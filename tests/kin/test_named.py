@@ -15,12 +15,15 @@ UR5 = kin.get_robot("ur5")
 T = kin.fk(UR5, UR5.q_home)
 SO101 = kin.get_robot("so101")
 POSES = np.array([SO101.q_home, SO101.q_home + 0.5])
+PIN = kin.calibration.TouchFixture([kin.calibration.TouchBoard.pin()])
+TOUCHES = kin.ik_branches(UR5, T)  # all postures with the tip at one point
 PAN = {"id": 1, "drive_mode": 0, "homing_offset": -12, "range_min": 740, "range_max": 3331}
 # The arguments after the robot of every public function that takes one.
 CALLS = {
     "branch_meanings": (),
     "branch_names": (),
     "branch_of": (UR5.q_home,),
+    "calibrate": (TOUCHES, [0] * len(TOUCHES), PIN),
     "capability_grid": (),
     "capability_map": (),
     "capsules": (),
@@ -50,6 +53,7 @@ CALLS = {
     "solve_ik_many": (T[None],),
     "solve_path": (T[None],),
     "to_pendant": (UR5.q_home,),
+    "touch_postures": (PIN, 2),
     "robot_to_mjcf": (),
     "robot_to_urdf": (),
     "workspace_facts": (),
