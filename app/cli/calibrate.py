@@ -140,6 +140,8 @@ def _as_typed(error: InputError, given: Read | None, fixture: TouchFixture) -> I
     if where is not None:
         what = where[1] if where[2] is None else f"socket {int(where[2]) + 1}{where[3]}"
         return InputError("--place, --table", what, error.expected)
+    if error.field == "wave":
+        return error.renamed("--waves")
     match = re.fullmatch(r"(q|done\[0\]|sockets|done\[1\])\[(\d+)\](?:\[(\d+)\])?", error.field)
     if match is None or given is None:
         return error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from html import escape
 
@@ -64,7 +65,11 @@ def report(found: Calibration, sockets: Sequence[int]) -> str:
         ("touches that the fit did not use, nominal table", found.held_out[0]),
         ("touches that the fit did not use, table found", found.held_out[1]),
     ]
-    rows = "".join(f'<tr><td>{what}</td><td class="n">{millimetres(value)}</td></tr>' for what, value in facts)
+    rows = "".join(
+        f'<tr><td>{what}</td><td class="n">{millimetres(value)}</td></tr>'
+        for what, value in facts
+        if not math.isnan(value)
+    )
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Calibration of {name}</title>'
         f"<style>{_STYLE}</style><h1>Calibration of {name}</h1><p>{escape(found.text)}</p>"

@@ -336,7 +336,8 @@ def expected_error(model: Model, fit: Fit, test: Array) -> ExpectedError:
     L = tip_modes(model.chain, test)
     values, vectors = np.linalg.eigh(fit.covariance)
     after, bound = spread(L @ (vectors * np.sqrt(np.maximum(values, 0.0))), fit.freedom, len(test))
-    before = float(np.sqrt(((L * model.sigma) ** 2).sum() / len(test)))
+    sigma = np.where(model.of_table, fit.wider * model.sigma, model.sigma)  # as the touches show them
+    before = float(np.sqrt(((L * sigma) ** 2).sum() / len(test)))
     return ExpectedError(before, after, bound, fit.noise * _of_readings(model, test))
 
 

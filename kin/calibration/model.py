@@ -174,8 +174,14 @@ class Model:
         tolerances: TableTolerances | None = None,
         noise: TouchNoise | None = None,
     ) -> Model:
-        """The model of an arm; what is not given is assumed."""
+        """The model of an arm; what is not given is assumed.
+
+        Raises:
+            InputError: waves of an arm with rows that follow joints: such a row has no encoder of its own.
+        """
         tolerances = TableTolerances.of(robot) if tolerances is None else tolerances
+        if tolerances.wave > 0.0 and robot.coupled:
+            raise InputError("wave", tolerances.wave, "0 for an arm with rows that follow joints")
         noise = TouchNoise.of(robot) if noise is None else noise
         noise.joints(robot)
         chain = Chain(robot, tolerances.wave > 0.0, tolerances.scale > 0.0)

@@ -21,7 +21,8 @@ class ExpectedError:
     What a motion of the whole arm with its base would mend does not count, because touching does not see it.
 
     Attributes:
-        before: with the nominal table, if its errors are as large as the tolerances.
+        before: with the nominal table, if its errors are as large as the tolerances, or as the wider ones that the
+            touches ask for.
         after: with the touches.
         bound: what 95 % stay below.
         readings: what the noise of readings alone does, which no table mends.
@@ -99,7 +100,7 @@ class Calibration:
         kept: indices of the touches that were used.
         misses: ``(k,)`` distance of each touch from what it touched, with the table found, metres.
         held_out: root mean square distance by which touches miss that the fit did not use, with the nominal table
-            and with the one found, metres.
+            and with the one found, metres; NaN if each is alone on its board, and so says nothing of itself.
         noise: how large the noise was, as a multiple of the stated one, 1 or more.
         wider: by what factor the tolerances were taken to be wider than stated, 1 to 3.
         places: ``(b, 4, 4)`` where the boards are.

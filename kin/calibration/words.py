@@ -99,11 +99,10 @@ def expected_text(expected: ExpectedError, count: int) -> str:
 def outcome(found: Calibration, count: int) -> str:
     """The whole result in a few sentences."""
     before, after, bound = map(millimetres, (found.expected.before, found.expected.after, found.expected.bound))
-    nominal, held_out = map(millimetres, found.held_out)
-    lines = [
-        f"The tip is expected to be off by {after} (95 %: below {bound}), from {before}.",
-        f"Touches that the fit did not use miss by {held_out}; with the nominal table by {nominal}.",
-    ]
+    lines = [f"The tip is expected to be off by {after} (95 %: below {bound}), from {before}."]
+    if not math.isnan(found.held_out[1]):
+        nominal, held_out = map(millimetres, found.held_out)
+        lines.append(f"Touches that the fit did not use miss by {held_out}; with the nominal table by {nominal}.")
     lines += [fault.text for fault in found.faults]
     if found.noise >= _SEVERAL:
         lines.append(

@@ -14,7 +14,8 @@ class ExpectedErrorAnswer(Answer):
     """Expected error of the tip: its root mean square over the workspace, after the best motion of the base."""
 
     before: float
-    """With the nominal table, in metres, if its errors are as large as the tolerances."""
+    """With the nominal table, in metres, if its errors are as large as the tolerances, or as the wider ones that
+    the touches ask for."""
     after: float
     """With the touches, in metres."""
     bound: float
@@ -101,9 +102,9 @@ class CalibrationAnswer(Answer):
     """Indices of the touches that were used."""
     misses: list[float]
     """Distance of each touch from what it touched, with the table found, in metres."""
-    held_out: list[float]
+    held_out: list[float | None]
     """Root mean square distance by which touches miss that the fit did not use, in metres: with the nominal table,
-    and with the one found."""
+    and with the one found; null if each is alone on its board."""
     noise: float
     """How large the noise was, as a multiple of the stated one, 1 or more."""
     wider: float

@@ -79,6 +79,19 @@ def test_a_contradiction_ends_with_1(touches: Path, tmp_path: Path, capsys) -> N
     assert "Touch 4 does not fit the others" in capsys.readouterr().out
 
 
+def test_touches_that_are_each_alone_on_a_board_say_nothing_of_themselves(tmp_path: Path, capsys) -> None:
+    q = kin.get_robot("ur5e").random_q(np.random.default_rng(2), 7)
+    file, page = tmp_path / "alone.csv", tmp_path / "report.html"
+    file.write_text("".join(f"{k + 1},{','.join(map(str, row))}\n" for k, row in enumerate(q.tolist())))
+    words = ["calibrate", "ur5e", str(file), "--pin", "--places", "7", "--html", str(page)]
+    assert main(words) == 0
+    assert "nan" not in capsys.readouterr().out + page.read_text(encoding="utf-8")
+    assert main([*words, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["held_out"] == [None, None]
+    assert "did not use" not in answer["text"]
+
+
 def test_touches_of_mistaken_joints_end_with_1_and_a_report(touches: Path, tmp_path: Path, capsys) -> None:
     rows = [line.split(",") for line in touches.read_text().splitlines()]
     for row in rows[1:]:
@@ -117,6 +130,8 @@ def test_options_that_do_not_fit_are_refused(capsys, tmp_path: Path) -> None:
     assert "--place" in capsys.readouterr().err
     assert main(["calibrate", "ur5e", "--pin", "--print", str(tmp_path / "a.svg")]) == 2
     assert "--sheet" in capsys.readouterr().err
+    assert main(["calibrate", "palletiser", "--pin", "--waves"]) == 2
+    assert "expected 0 for an arm with rows that follow joints" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("place", [[], ["--place", "270:0:50"]])

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import kin
+from kin.calibration import expected_error
 from kin.calibration.chain import Chain
 from kin.calibration.faults import checked
 from kin.calibration.fit import Touches, fit
 from kin.calibration.fixtures import PLANE, Places, TouchBoard, TouchFixture
-from kin.calibration.model import TableTolerances
+from kin.calibration.model import Model, TableTolerances
 from kin.calibration.postures import Scene, candidates
 from tests.kin.calibration.simulated import (
     DEG,
@@ -122,6 +123,10 @@ def test_tolerances_widen_but_not_beyond_three_times(ur5e):
         _, _, touches = ur5e.simulated(5, 30, errors=large)
         found = fit(model, touches)
         assert low <= found.wider <= high, factor
+        stated, taken = (
+            expected_error(model, replace(found, wider=each), ur5e.test).before for each in (1.0, found.wider)
+        )
+        assert taken == pytest.approx(found.wider * stated, rel=0.1)  # the tool point stays as well known
 
 
 def test_a_common_scale_is_found_with_a_known_distance(ur5e):
@@ -334,6 +339,7 @@ def test_exchanged_columns_are_found(ur5e):
         (lambda: TouchFixture([TouchBoard.pin()], at_base=[]), "at_base"),
         (lambda: TableTolerances(zero=0.0), "zero"),
         (lambda: TableTolerances(scale=0.5), "scale"),
+        (lambda: Model.of(kin.get_robot("palletiser"), BAR, TableTolerances(wave=0.1)), "wave"),
         (lambda: kin.calibration.TouchNoise(0.0), "joint"),
         (lambda: kin.calibration.TouchNoise(0.1, 2.0), "contact"),
     ],
