@@ -78,7 +78,7 @@ class KernelCompiler:
             if self.child is not None and self.child.poll() is not None:
                 kill(self.child)
                 self.child = None
-            child = self.child = self.child or start_process(SERVE, text=True, stderr=subprocess.DEVNULL)
+            child = self.child = self.child or self._start()
         done = _answer(child, line) == DONE
         if self._stopped:
             raise CompilerStoppedError
@@ -86,6 +86,14 @@ class KernelCompiler:
             self._warned = True
             logger.warning("a compiling process ended early; another one is started when it is needed")
         return done
+
+    @staticmethod
+    def _start() -> subprocess.Popen[str]:
+        child = start_process(SERVE, text=True, stderr=subprocess.DEVNULL)
+        # An idle process ends while nobody looks, and stays in the system's table until somebody waits for it.
+        with contextlib.suppress(RuntimeError):  # no thread is left: the next kernel finds that it has ended
+            threading.Thread(target=child.wait, name="kinboard-compiler-end", daemon=True).start()
+        return child
 
 
 class Compilers:

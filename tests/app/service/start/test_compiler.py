@@ -69,6 +69,12 @@ def test_the_kernel_after_an_idle_process_has_ended_has_a_new_one(made, tmp_path
     assert not caplog.records
 
 
+def test_an_idle_process_that_has_ended_leaves_the_table_of_the_system_at_once(made, tmp_path):
+    assert made.submit(kernel(tmp_path, "first")).result(20)
+    made.child.stdin.close()  # it ends by itself
+    wait_for(lambda: made.child.returncode is not None)
+
+
 @pytest.mark.full
 def test_an_idle_process_ends_with_its_memory():
     program = "from kin.kernels import elsewhere; elsewhere.IDLE = 0.01; elsewhere.serve()"
