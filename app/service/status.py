@@ -42,8 +42,7 @@ class Readiness(BaseModel):
         description="Whether all kernels are compiled. Until then, first uses may take seconds."
     )
     kernels: Kernels | None = Field(
-        description="Those besides the first arm's, while they are compiled; null before that, and when all are, "
-        "and while this process does not know their names yet."
+        description="Those besides the first arm's, while they are compiled; null before that, and when all are."
     )
     classrooms: Literal["ready", "off", "read-only", "missing", "newer-database"] = Field(
         description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), if the folder "
