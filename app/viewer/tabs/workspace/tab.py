@@ -1,7 +1,8 @@
 """The workspace tab: its settings, and the events between its parts.
 
 Each part has a module: `cloud` (points in the scene), `cut`, `pick` (clicks on points), `sizes`, `section`, and
-the folder `capability`. Slow work runs in background threads that post their results here.
+the folder `capability`. Points and picks are computed in background threads that post their results here; what
+else takes long is declared as work.
 """
 
 from __future__ import annotations
