@@ -93,6 +93,8 @@ class Startup:
 
     def _run(self) -> None:
         try:
+            if not rest_compiled():  # before there are pages: they wait for what is missing
+                self.preparation.begin()
             self._start_viewer()
             if not (compiled() or self._stopping.is_set()):
                 with ThreadPoolExecutor(2, "kinboard-warm-up") as threads:
@@ -111,6 +113,9 @@ class Startup:
             # REST goes on working; /readyz reports the failure.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
             self.status = "failed"
+        finally:
+            if self.status != "ready":  # nobody compiles the others: pages do not wait for them
+                self.preparation.finish()
 
     @staticmethod
     def _warm_up_first(backwards: bool) -> None:
@@ -137,8 +142,6 @@ class Startup:
     def _prepare_parts(self) -> None:
         """Load or compile the parts one after the other, those that visitors wait for first."""
         try:
-            if not rest_compiled():
-                self.preparation.begin()
             while not self._stopping.is_set() and (task := self.preparation.next()) is not None:
                 name, step = task
                 step()
