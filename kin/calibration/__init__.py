@@ -132,8 +132,7 @@ def touch_postures(
         places: roughly where the boards lie, a pose ``(4, 4)`` of each in the world frame with z out of the
             sockets. By default where many postures touch, in front of the arm.
         table: height of the table in the world frame, metres; by default the arm's floor, or that of its base.
-        done: ``(q, sockets)`` of touches that were made already, as in `kin.calibration.calibrate`: joint values
-            in radians (metres) and numbers of sockets. `count` further ones are proposed.
+        done: ``(q, sockets)`` of touches made already, q in radians (metres); `count` further ones are proposed.
         tolerances, noise: as in `kin.calibration.calibrate`.
         seed: of the random candidates.
 

@@ -38,7 +38,7 @@ class Limits:
 
     @asynccontextmanager
     async def trying(self, client: str) -> AsyncIterator[None]:
-        """The time of one try of a code, after a pause if many were wrong; raises 429. `wrong` is called within."""
+        """The time of one try, after a pause if many were wrong; raises 429. `wrong` is called within."""
         while (wait := self._wait(client)) == 0.0 and self._may_all_be_wrong(client):
             await self._decided.wait()
         if wait > 0.0:
