@@ -140,8 +140,7 @@ def touch_postures(
         Configurations free of collisions with the arm itself and the table.
 
     Raises:
-        InputError: other than one place for each board, too many touches, a socket that the arm cannot touch, or
-            touches made already that are outside the limits or of another socket.
+        InputError: not one place for each board, too many touches, a socket out of reach, or as of `calibrate`.
 
     Examples:
         >>> import kin
@@ -159,8 +158,7 @@ def touch_postures(
     poses = _poses(robot, fixture, places, height)
     scene = Scene(robot, fixture, height, poses)
     offered = candidates(scene, whole_number("seed", seed, 0, 2**31))
-    where_to = "table" if places is None and fixture.at_base is None else "places"
-    _check_offered(scene, offered, where_to)
+    _check_offered(scene, offered, "table" if places is None and fixture.at_base is None else "places")
     before = _made(model, done)
     whole = Touches(np.vstack([before.q, offered.q]), np.concatenate([before.at, offered.at]))
     test = workspace_poses(robot, _POSES, height)
