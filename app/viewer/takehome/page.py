@@ -36,9 +36,11 @@ from app.viewer.takehome.solver import solver_of
 from app.viewer.views.templates import render
 from kin import IKOptions, InputError, Obstacle, Robot, __version__, solve_ik
 from kin.collision.solids import BOX, CYLINDER
+from kin.ik.problem import read_pose
 from kin.motion import Motion
 from kin.named import robot_of
 from kin.robot import Joint
+from kin.solvers.contract import POSE
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units, typeset
 
@@ -304,9 +306,12 @@ def _packed(rows: NDArray[Any]) -> str:
 
 def _target(saved: SavedArm, target: ArrayLike) -> dict[str, Any]:
     result = solve_ik(saved.robot, target, q_seed=saved.q, options=saved.options)
-    postures = [{"q": each.q.tolist(), "name": short(each.branch)} for each in result.solutions]
+    postures = [
+        {"q": each.q.tolist(), "name": short(each.branch), "branch": each.branch} for each in result.solutions
+    ]
+    # Kernels take no pose of rounded digits, as `solve_ik` does.
     return {
-        "pose": np.asarray(target, dtype=float).ravel().tolist(),
+        "pose": read_pose(target, POSE)[0].ravel().tolist(),
         "reason": typeset(result.explain(saved.units).text),
         "postures": postures,
         "plain": saved.options == _OPTIONS,

@@ -101,6 +101,20 @@ def test_postures_of_the_target_meet_it():
     for each in data["postures"]:
         assert np.allclose(kin.fk(UR5, each["q"]), T, atol=1e-9)
     assert "8 configurations" in data["reason"]
+    assert [each["branch"] for each in data["postures"]] == [
+        x.branch for x in kin.solve_ik(UR5, T, q_seed=Q).solutions
+    ]
+
+
+def test_a_target_of_rounded_digits_is_a_pose_in_the_file():
+    T = np.round(kin.fk(UR5, Q), 4)
+    R = T[:3, :3]
+    assert np.abs(R.T @ R - np.eye(3)).max() > 1e-6, "more than the kernels of the page take"
+    data = data_of(web_page(SavedArm(UR5, Q, target=T)))["target"]
+    pose = np.reshape(data["pose"], (4, 4))
+    assert np.allclose(pose[:3, :3].T @ pose[:3, :3], np.eye(3), atol=1e-12)
+    assert np.allclose(pose, T, atol=1e-4)
+    assert len(data["postures"]) == 8
 
 
 def test_a_target_out_of_reach_has_a_reason_and_no_postures():
