@@ -63,6 +63,10 @@
     q: data.q.slice(), target: data.target?.pose ?? (solver && fk(data.q)), saved: Boolean(data.target), found: null, chosen: -1,
     value: null, frames: false, ghosts: true, time: 0, playing: false,
   };
+  // The kernels write names of branches in plain letters.
+  for (const each of (solver && data.target?.postures) || []) {
+    each.branch = kernels.branches[data.solver.branches.findIndex(([name]) => name === each.branch)];
+  }
 
   // ---- The scene ----
 
@@ -471,12 +475,14 @@
   let waiting = false;
   let leads = false; // whether the arm goes where the target leads it, to the posture that is nearest to where it is
   let resting = 0;
+  let searching = 0; // for the bar of values
   let took = 0; // ms, to find what comes closest
 
   // A new target: solved for at the next frame, so at most once a frame.
   function aim(T) {
     pause();
     Object.assign(state, { target: T, value: null, saved: false });
+    if (free) free.error.hidden = true;
     leads = true;
     solveSoon();
   }
@@ -485,6 +491,7 @@
   function follow() {
     if (!solver) return;
     Object.assign(state, { target: fk(state.q), value: null, saved: false });
+    if (free) free.error.hidden = true;
     leads = false;
     if (state.playing) state.found = null;
     else solveSoon();
@@ -492,6 +499,7 @@
 
   function solveSoon() {
     clearTimeout(resting);
+    clearTimeout(searching);
     if (waiting) return;
     waiting = true;
     requestAnimationFrame(() => { waiting = false; solve(); });
@@ -499,10 +507,15 @@
 
   function solve() {
     if (state.playing) return;
+    // What else was asked of the saved target, such as clear of obstacles, only its saved answer knows.
+    if (state.saved && data.target.plain === false) {
+      if (free) showFree();
+      return;
+    }
     state.found = solver.answer(state.target, state.q, state.value);
     const reached = ["solved", "approximate"].includes(state.found.status);
     if (reached && leads) state.q = state.found.rows[0].q;
-    if (reached && data.solver.parameter) resting = setTimeout(showFree, REST);
+    if (reached && data.solver.parameter) resting = setTimeout(() => { showValue(); showBar(); }, REST);
     // Arms with few joints seldom meet a whole pose: they follow the point as it is dragged, where that is quick.
     if (!reached && data.solver.few && leads && took < QUICK) rest();
     else if (!reached && !state.saved) resting = setTimeout(rest, REST);
@@ -604,7 +617,9 @@
     const found = solver.answer(state.target, state.q, value);
     free.slider.value = value;
     if (found.status === "solved") {
-      Object.assign(state, { value, found, q: (found.rows.find(({ branch }) => branch === now) ?? found.rows[0]).q });
+      // Without intervals, branches are numbered anew at each value: the nearest goes on.
+      const same = kernels.intervals && found.rows.find(({ branch }) => branch === now);
+      Object.assign(state, { value, found, saved: false, q: (same || found.rows[0]).q });
       free.error.hidden = true;
     } else {
       free.error.hidden = false;
@@ -614,8 +629,23 @@
     showFree();
   }
 
-  // The bar of values that the limits allow in the posture on show.
+  // The value of the posture on show and the bar; one that must be searched for waits until the slider rests.
   function showFree() {
+    showValue();
+    clearTimeout(searching);
+    if (kernels.intervals) showBar();
+    else searching = setTimeout(showBar, REST);
+  }
+
+  function showValue() {
+    const row = postures()[state.chosen];
+    if (row) free.slider.value = state.value ?? solver.valueAt(state.target, row);
+    free.slider.setAttribute("aria-valuetext", withUnit(Number(free.slider.value), true));
+    free.refresh();
+  }
+
+  // The bar of values that the limits allow in the posture on show, or in any where postures have no lasting names.
+  function showBar() {
     const row = postures()[state.chosen];
     const { low, high } = data.solver.parameter;
     const allowed = row ? solver.intervals(state.target, state.q, row.branch) : [];
@@ -628,9 +658,6 @@
     }));
     const listed = allowed.slice(0, 4).map(([from, to]) => `${written(from, true)} … ${withUnit(to, true)}`).join(", ");
     find("#free .quiet").textContent = listed ? `feasible: ${listed}` : "no value is feasible";
-    if (row) free.slider.value = state.value ?? solver.valueAt(state.target, row);
-    free.slider.setAttribute("aria-valuetext", withUnit(Number(free.slider.value), true));
-    free.refresh();
   }
 
   // ---- Program ----
@@ -738,6 +765,7 @@
     data.units.degrees = event.target.value === "deg";
     heads();
     show();
+    if (free && state.target) showFree();
   });
 
   const system = matchMedia("(prefers-color-scheme: dark)");
@@ -760,7 +788,7 @@
   find("#target").hidden = !state.target;
   for (const each of document.querySelectorAll("[data-needs]")) each.hidden = !{ solver, target: state.target }[each.dataset.needs];
   if (solver) find("#target-title").textContent = "Target";
-  if (solver && data.target?.plain !== false) solveSoon();
+  if (solver) solveSoon();
   show();
   // For scripts beside this one: what the page computes and shows.
   window.kinboardArm = { fk, scene, q: () => state.q.slice(), target: () => state.target, found: () => state.found };

@@ -9,6 +9,7 @@
 
   const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
   const minus = (a, b) => a.map((x, i) => x - b[i]);
+  const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
   const pointOf = (T) => [T[3], T[7], T[11]];
 
   // kernels: the generated constant; about: what app/viewer/takehome wrote of the arm; fk(q): 16 numbers by rows.
@@ -90,14 +91,16 @@
       return far < near - SAME ? "too near" : "outside";
     }
 
-    // [low, high] of the redundancy parameter where its limits allow a branch, or any; by steps where they are not known.
+    // [low, high] of the redundancy parameter where its limits allow a branch, or any. Where they are not known it is by
+    // steps and the seed's value, and always any: branches are numbered anew at each value.
     function intervals(T, seed, branch = null) {
       const on = (row) => branch === null || row.branch === branch;
       if (kernels.intervals) return kernels.intervals(T, seed).filter(on).map(({ low, high }) => [low, high]);
+      const { joint, low, high } = parameter;
+      const values = Array.from({ length: Math.floor((high - low) / STEP) + 1 }, (_, k) => low + k * STEP);
       const found = [];
-      for (let value = parameter.low; value <= parameter.high; value += STEP) {
-        const { status, solutions } = kernels.ik_at(T, value, seed);
-        if (status !== "solved" || !solutions.some(on)) continue;
+      for (const value of [...values, clamp(seed[joint], low, high)].sort((a, b) => a - b)) {
+        if (kernels.ik_at(T, value, seed).status !== "solved") continue;
         if (found.length && value - found.at(-1)[1] < 1.5 * STEP) found.at(-1)[1] = value;
         else found.push([value, value]);
       }

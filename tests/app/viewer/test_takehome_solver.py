@@ -125,6 +125,17 @@ def test_the_bar_of_the_redundancy_parameter_is_that_of_the_product(robot_id, tm
         assert seed is not None
 
 
+@pytest.mark.full
+def test_the_bar_of_an_arm_without_intervals_is_of_all_postures_and_has_the_present_value(tmp_path):
+    gen3 = kin.get_robot("gen3")
+    q = gen3.q_home + np.array([0.1, 0.2, -0.3, 0.4, 0.5, -0.6, 0.0123])
+    (found,) = answers(gen3, kin.fk(gen3, q)[None], q[None], tmp_path)
+    assert found["value"] == pytest.approx(q[6])
+    assert any(low <= q[6] <= high for low, high in found["free"])
+    alone = answers(gen3, kin.fk(gen3, q)[None], (q + 2e-3)[None], tmp_path)[0]
+    assert len(alone["free"]) == len(found["free"]), "whatever the posture is called"
+
+
 @pytest.mark.parametrize(
     "bad",
     [

@@ -204,6 +204,30 @@ def test_a_target_is_typed_and_dragged_and_the_page_solves(saved: Page) -> None:
     expect(saved.locator("#postures button")).to_have_count(8)
 
 
+def test_a_saved_target_with_obstacles_keeps_its_answer(browser: Browser, tmp_path: Path) -> None:
+    iiwa, ball = kin.get_robot("iiwa14"), kin.Obstacle("sphere", [0.0, 0.0, 3.0], radius=0.1)
+    q = iiwa.clip(iiwa.q_home + 0.4)
+    path = kin.save_page(iiwa, tmp_path / "iiwa.html", q, target=kin.fk(iiwa, q), obstacles=[ball])
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    bar, postures = page.locator("#free .quiet"), page.locator("#postures button")
+    expect(bar).to_contain_text("feasible: ")
+    count = postures.count()
+    assert count > 0
+    assert page.evaluate("kinboardArm.found()") is None
+    page.get_by_role("button", name="Home").click()
+    page.get_by_role("button", name="As saved").click()
+    settled(page)
+    assert page.evaluate("kinboardArm.found()") is None
+    assert np.allclose(page.evaluate("kinboardArm.q()"), q)
+    expect(postures).to_have_count(count)
+    page.get_by_label("Angles").select_option("radians")
+    expect(bar).not_to_contain_text("°")
+    page.get_by_label("arm angle ψ", exact=True).press("ArrowRight")
+    assert page.evaluate("kinboardArm.found()") is not None, "another value is solved for here"
+    page.close()
+
+
 def test_the_arm_is_drawn_and_can_be_turned_with_the_keyboard(saved: Page) -> None:
     canvas = saved.locator("#scene canvas")
     expect(canvas).to_have_attribute("aria-label", DESCRIBED)
