@@ -119,7 +119,8 @@ def save_page(
         target: pose of the tool ``(4, 4)`` that the page opens with, metres; None: the one at `q`.
         motion: of the same arm, from `plan_motion`.
         link: address of the full page, which the file names; "": none.
-        obstacles: bodies around the arm in the world frame, which the page draws and the postures keep clear of.
+        obstacles: bodies around the arm in the world frame, which the page draws; the postures of `target` keep
+            clear of them, others do not.
 
     Returns:
         The path of the file.

@@ -115,13 +115,19 @@ def web_page(saved: SavedArm, shared: bool = False) -> str:
         shared: whether what the pages of all arms have in common is in files beside this one (`shared_files`).
 
     Raises:
-        InputError: a link that is no address of a web page, or a program with nothing to drive.
+        InputError: a link that is no address of a web page, a program with nothing to drive, or obstacles for
+            which there is no room.
     """
     if saved.link and not saved.link.startswith(("http://", "https://")):
         raise InputError("link", saved.link, "an address that begins with http:// or https://")
     page = _page(saved, saved.drawn, shared)
     if saved.drawn is not None and len(page.encode()) > LARGEST:
         page = _page(saved, None, shared)
+    if saved.obstacles and len(page.encode()) > LARGEST:
+        count = len(saved.obstacles)
+        raise InputError(
+            "obstacles", f"{count} in {len(page.encode())} bytes", f"a page of at most {LARGEST} bytes"
+        )
     return page
 
 
@@ -272,7 +278,7 @@ def _obstacle(obstacle: Obstacle) -> tuple[Part, int, Array]:
     elif solid == CYLINDER:
         mesh = creation.cylinder(half[0], 2.0 * half[2], sections=48)
     else:
-        mesh = creation.icosphere(3, half[0])
+        mesh = creation.icosphere(2, half[0])
     return Part("obstacle", mesh, _OBSTACLE), 0, obstacle.T
 
 

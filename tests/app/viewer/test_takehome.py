@@ -21,8 +21,10 @@ from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid
 from app.viewer.takehome import LARGEST, SavedArm, save_page, web_page
+from app.viewer.takehome import page as page_of_arm
 from app.viewer.takehome.page import shared_files
 from app.viewer.takehome.sending import send_page
+from kin.collision.obstacles import MOST_OBSTACLES
 from kin.motion import JointTarget, Program, Ptp
 from kin.units import DEFAULT_UNITS, Units
 
@@ -258,3 +260,13 @@ def test_obstacles_are_drawn_where_they_are(tmp_path: Path) -> None:
         local = (points - F[:3, 3]) @ F[:3, :3]
         assert np.allclose(local.min(axis=0), low, atol=2e-3)
         assert np.allclose(local.max(axis=0), high, atol=2e-3)
+
+
+def test_many_obstacles_leave_room_and_too_large_a_page_is_refused(monkeypatch):
+    balls = tuple(kin.Obstacle("sphere", [0.1 * k, 0.4, 0.5], radius=0.1) for k in range(MOST_OBSTACLES))
+    alone = len(web_page(SavedArm(UR5, Q)))
+    assert len(web_page(SavedArm(UR5, Q, obstacles=balls))) - alone < 3000 * MOST_OBSTACLES
+    monkeypatch.setattr(page_of_arm, "LARGEST", alone)
+    with pytest.raises(kin.InputError, match="obstacles"):
+        web_page(SavedArm(UR5, Q, obstacles=balls))
+    assert len(web_page(SavedArm(UR5, Q))) == alone
