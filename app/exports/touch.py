@@ -50,7 +50,7 @@ def sheet_svg(paper: str) -> str:
 
 
 def report(found: Calibration, sockets: Sequence[int]) -> str:
-    """The result as one page: how far the tip will be off, how far each touch misses, and every error.
+    """The result as one page: how far the tip is expected to be off, how far each touch misses, and every error.
 
     Args:
         sockets: what was touched, counted from 0; −1 is the plane.
@@ -60,7 +60,7 @@ def report(found: Calibration, sockets: Sequence[int]) -> str:
     facts = [
         ("with the nominal table", expected.before),
         ("with the table found", expected.after),
-        ("95 % stay below", expected.bound),
+        ("95 % are expected to stay below", expected.bound),
         ("of the noise of readings alone", expected.readings),
         ("touches that the fit did not use, nominal table", found.held_out[0]),
         ("touches that the fit did not use, table found", found.held_out[1]),

@@ -2,7 +2,8 @@
 
 An arm touches one fixed point, several sockets of one board, or a plane, from many postures. From the joint
 readings alone its table is estimated. `touch_postures` says in which postures to touch, `calibrate` what the
-touches have shown. Both say how far the tip will be off.
+touches have shown. Both say how far the tip is expected to be off; that was
+measured on simulated arms only (``docs/calibrate.md``).
 
 >>> import kin, numpy as np
 >>> arm, fixture = kin.get_robot("puma560"), kin.calibration.TouchFixture([kin.calibration.TouchBoard.bar(0.15)])
@@ -140,7 +141,7 @@ def touch_postures(
         Configurations free of collisions with the arm itself and the table.
 
     Raises:
-        InputError: not one place for each board, too many touches, a socket out of reach, or as of `calibrate`.
+        InputError: not one place for each board, a socket out of reach, or touches that `calibrate` refuses.
 
     Examples:
         >>> import kin
@@ -158,7 +159,7 @@ def touch_postures(
     poses = _poses(robot, fixture, places, height)
     scene = Scene(robot, fixture, height, poses)
     offered = candidates(scene, whole_number("seed", seed, 0, 2**31))
-    _check_offered(scene, offered, "table" if places is None and fixture.at_base is None else "places")
+    _check_offered(scene, offered, places)
     before = _made(model, done)
     whole = Touches(np.vstack([before.q, offered.q]), np.concatenate([before.at, offered.at]))
     test = workspace_poses(robot, _POSES, height)
@@ -195,8 +196,9 @@ def _poses(robot: Robot, fixture: TouchFixture, places: Sequence[ArrayLike] | No
     return np.array(poses)
 
 
-def _check_offered(scene: Scene, offered: Touches, field: str) -> None:
-    """Whether the arm can touch every socket; `field` is what to change if not."""
+def _check_offered(scene: Scene, offered: Touches, places: Sequence[ArrayLike] | None) -> None:
+    """Whether the arm can touch every socket; `places` are those that were given."""
+    field = "table" if places is None and scene.fixture.at_base is None else "places"
     wanted = [*range(len(scene.sockets)), *([PLANE] if scene.fixture.plane else [])]
     for j in wanted:
         if not (offered.at == j).any():

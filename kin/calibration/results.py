@@ -24,7 +24,7 @@ class ExpectedError:
         before: with the nominal table, if its errors are as large as the tolerances, or as the wider ones that the
             touches ask for.
         after: with the touches.
-        bound: what 95 % stay below.
+        bound: what 95 % are expected to stay below, as simulated arms have; no real one has been measured.
         readings: what the noise of readings alone does, which no table mends.
     """
 

@@ -19,7 +19,7 @@ class ExpectedErrorAnswer(Answer):
     after: float
     """With the touches, in metres."""
     bound: float
-    """What 95 % stay below, in metres."""
+    """What 95 % are expected to stay below, in metres; measured on simulated arms only."""
     readings: float
     """What the noise of readings alone does, in metres; no table mends it."""
 

@@ -1,4 +1,4 @@
-"""What is said of the error of a tip holds, in two hundred simulated calibrations of each arm and fixture."""
+"""Whether what is said of the error of a tip holds, in 200 simulated calibrations of each arm and fixture."""
 
 import numpy as np
 import pytest
