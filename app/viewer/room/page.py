@@ -25,12 +25,15 @@ class ClassroomPage(MemberPage):
 
     # Worker
 
-    def _prepare(self) -> None:
-        super()._prepare()
+    def _load(self) -> None:
+        super()._load()
         if self._persistence.embedded:  # a figure in another page: neither led nor frozen, and no arm of the wall
             self.offered = tuple(tab for tab in self.offered if not issubclass(tab, Member))
             return
-        # Not while the page is built: a database that does not answer would hold up the pages of everybody.
+        if self._inbox.closed:
+            return
+        # Not while the page is built: a database that does not answer would hold up the pages of everybody. And
+        # before the page waits for its arm: the class sees who is there.
         news = ("news", Member.key, NEWS)
         self.attendance = self._hub.attend(self._ticket, lambda: self.post(news), self.channel.silence)
 

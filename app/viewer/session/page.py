@@ -431,10 +431,14 @@ class VisitorPage(ShownArm, Worker):
         update_html(self.panel.hints, render("panel/hints", place=place, arm=arm))
 
     def _prepare(self) -> None:
-        self._persistence.load()
+        self._load()
         saved = self._persistence.stored
-        self.own = saved.own
         self._preparing.wait(saved, robot_of(self, saved.robot), self.offered, lambda: self._inbox.closed)
+
+    def _load(self) -> None:
+        """Find out with what the page starts, before it waits for the kernels of that."""
+        self._persistence.load()
+        self.own = self._persistence.stored.own
 
     def _build(self) -> None:
         gui = self.client.gui
