@@ -140,7 +140,10 @@ def main() -> None:
     """Compute until the service ends. Messages come on the standard input and go to the standard output."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # so that nothing else is written there
-    begin: Begin = pickle.loads(read(requests))
+    try:
+        begin: Begin = pickle.loads(read(requests))
+    except EOFError:
+        return  # the service has ended before it said anything
     settings = begin.settings
     _PROCESS.settings, _PROCESS.robots = settings, {robot.id: robot for robot in begin.robots}
     work = ComputeSlots(1, settings.time_budget, memory=AnswerMemory(settings.max_answer, settings.max_answer))
