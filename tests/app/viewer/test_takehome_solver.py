@@ -37,7 +37,8 @@ console.log(JSON.stringify(T.map((target, i) => {
     ? solver.intervals(target, seeds[i], found.rows[0].branch) : null;
   const value = free && solver.valueAt(target, found.rows[0]);
   const names = found.rows.map(({ row }) => about.branches[row]?.[0]);
-  return { ...found, text: words.text(found), names, free, value };
+  const last = free && solver.intervals(target, seeds[i], found.rows.at(-1).branch);
+  return { ...found, text: words.text(found), names, free, value, last };
 })));
 """
 
@@ -129,11 +130,15 @@ def test_the_bar_of_the_redundancy_parameter_is_that_of_the_product(robot_id, tm
 def test_the_bar_of_an_arm_without_intervals_is_of_all_postures_and_has_the_present_value(tmp_path):
     gen3 = kin.get_robot("gen3")
     q = gen3.q_home + np.array([0.1, 0.2, -0.3, 0.4, 0.5, -0.6, 0.0123])
-    (found,) = answers(gen3, kin.fk(gen3, q)[None], q[None], tmp_path)
+    T = kin.fk(gen3, q)
+    (found,) = answers(gen3, T[None], q[None], tmp_path)
     assert found["value"] == pytest.approx(q[6])
+    assert len(found["rows"]) > 1
+    assert found["last"] == found["free"], "whatever the posture is called"
+    for value in np.radians(np.arange(-178.0, 180.0, 4.0)):
+        solved = kin.solve_ik(gen3, T, q_seed=q, redundancy=value).status.value == "solved"
+        assert any(low <= value <= high for low, high in found["free"]) or not solved
     assert any(low <= q[6] <= high for low, high in found["free"])
-    alone = answers(gen3, kin.fk(gen3, q)[None], (q + 2e-3)[None], tmp_path)[0]
-    assert len(alone["free"]) == len(found["free"]), "whatever the posture is called"
 
 
 @pytest.mark.parametrize(
