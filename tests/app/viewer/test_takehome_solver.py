@@ -138,7 +138,10 @@ def test_the_bar_of_an_arm_without_intervals_is_of_all_postures_and_has_the_pres
     for value in np.radians(np.arange(-178.0, 180.0, 4.0)):
         solved = kin.solve_ik(gen3, T, q_seed=q, redundancy=value).status.value == "solved"
         assert any(low <= value <= high for low, high in found["free"]) or not solved
-    assert any(low <= q[6] <= high for low, high in found["free"])
+    seeds = np.array([[*q[:6], value] for value in np.radians(np.arange(179.3, -180.0, -9.1))])
+    for each in answers(gen3, np.repeat(T[None], len(seeds), axis=0), seeds, tmp_path):
+        assert each["last"] == each["free"], "whatever the posture is called"
+        assert any(low <= each["held"] <= high for low, high in each["free"])
 
 
 @pytest.mark.parametrize(
