@@ -65,12 +65,15 @@ def serve() -> None:
     The process ends after `IDLE` seconds without a line.
     """
     end = _end_when_idle()
-    for line in sys.stdin:
+    try:
+        for line in sys.stdin:
+            end.cancel()
+            module, name, signature = line.split()
+            getattr(import_module(module), name).compile(pickle.loads(bytes.fromhex(signature)))
+            print(DONE, flush=True)
+            end = _end_when_idle()
+    finally:
         end.cancel()
-        module, name, signature = line.split()
-        getattr(import_module(module), name).compile(pickle.loads(bytes.fromhex(signature)))
-        print(DONE, flush=True)
-        end = _end_when_idle()
 
 
 def _end_when_idle() -> threading.Timer:

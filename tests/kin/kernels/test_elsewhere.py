@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
 import pickle
 import sys
+import threading
 from collections.abc import Iterator
 from importlib import import_module, invalidate_caches
 from pathlib import Path
@@ -75,6 +77,10 @@ def test_a_process_compiles_what_its_lines_name_and_another_one_loads_it(module,
     monkeypatch.setattr(sys, "stdin", io.StringIO(f"{line}\n"))
     serve()
     assert capsys.readouterr().out == f"{DONE}\n"
+    timers = [each for each in threading.enumerate() if isinstance(each, threading.Timer)]
+    assert not any(each.function is os._exit and not each.finished.is_set() for each in timers), (
+        "no end hangs over"
+    )
     compile_elsewhere(helper)
     again = jit(module.outer.py_func)  # as another process has it: with the same cache, and nothing loaded
     monkeypatch.setattr(module, "outer", again)
