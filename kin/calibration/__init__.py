@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from kin.calibration.chain import Mask, Parameter
 from kin.calibration.faults import Checked, Fault, checked
-from kin.calibration.fit import PRIOR_NOISE, Fit, Touches, solve, spread
+from kin.calibration.fit import Fit, Touches, freedom_of, solve, spread
 from kin.calibration.fixtures import PLANE, TouchBoard, TouchFixture
 from kin.calibration.model import Model, TableTolerances, TouchNoise, tip_modes
 from kin.calibration.postures import (
@@ -214,8 +214,7 @@ def _predicted(model: Model, parts: Pieces, chosen: list[int], test: Array) -> E
     """What these touches are expected to bring, if noise and tolerances are as stated."""
     values, vectors = np.linalg.eigh(parts.covariance(chosen))
     root = parts.L @ (vectors * np.sqrt(np.maximum(values, 0.0))) * math.sqrt(len(test))
-    freedom = max(PRIOR_NOISE + 3.0 * len(chosen) - model.count, 5.0)
-    after, bound = spread(root, freedom, len(test))
+    after, bound = spread(root, freedom_of(model, len(chosen)), len(test))
     before = float(np.sqrt((parts.L**2).sum()))
     return ExpectedError(before, after, bound, _of_readings(model, test))
 

@@ -99,7 +99,12 @@ class Fit:
     @property
     def freedom(self) -> float:
         """Degrees of freedom with which the noise is known."""
-        return max(PRIOR_NOISE + 3.0 * len(self.touches) - self.model.count, 5.0)
+        return freedom_of(self.model, len(self.touches))
+
+
+def freedom_of(model: Model, count: int) -> float:
+    """Degrees of freedom with which so many touches let the noise be known."""
+    return max(PRIOR_NOISE + 3.0 * count - model.count, 5.0)
 
 
 def fit(model: Model, touches: Touches, start: Array | None = None) -> Fit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from codecs import BOM_UTF8
 from pathlib import Path
 
 from kin.errors import InputError
@@ -11,7 +12,6 @@ from kin.files.urdf.read import read_urdf
 from kin.robot import Robot
 
 _XML = {".urdf", ".xml", ".mjcf", ".xacro"}
-_MARK = b"\xef\xbb\xbf"  # of the byte order
 
 
 def load_robot(source: os.PathLike[str] | str, base: str | None = None, tip: str | None = None) -> Robot:
@@ -64,6 +64,6 @@ def _is_xml(path: Path) -> bool:
         return ending in _XML
     try:
         with path.open("rb") as file:
-            return file.read(1000).removeprefix(_MARK).lstrip().startswith(b"<")
+            return file.read(1000).removeprefix(BOM_UTF8).lstrip().startswith(b"<")
     except OSError:
         return False  # the reader says why it cannot be read

@@ -81,7 +81,7 @@ class Source:
             text = (self._first + self._file.read()).decode("utf-16", "replace")
             self._first, self._file = text.encode(), io.BytesIO()
         self.field = field
-        start = self._first.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
+        start = self._first.removeprefix(codecs.BOM_UTF8).lstrip()[:1]
         self.form: Form = "npy" if self._first.startswith(_NUMPY) else "ndjson" if start in (b"{", b"[") else "csv"
 
     def configurations(
@@ -273,7 +273,7 @@ class Source:
 
     def _lines(self) -> Iterator[list[tuple[str, str]]]:
         """Lines as they arrive, without empty ones, each with its place."""
-        rest, done, number, chunk = b"", 0, 0, self._first.removeprefix(b"\xef\xbb\xbf")
+        rest, done, number, chunk = b"", 0, 0, self._first.removeprefix(codecs.BOM_UTF8)
         while chunk or rest:
             *whole, rest = (rest + chunk).split(b"\n") if chunk else [rest, b""]
             if len(rest) > LONGEST_LINE:
