@@ -29,6 +29,7 @@ from kin.doctor import UrdfExamination, examine_urdf
 from kin.doctor.findings import RANKS
 from kin.files import UrdfReport, UrdfRobot, read_urdf
 from kin.files.builtin import BUILTIN
+from kin.files.load import XML
 from kin.units import DEFAULT_UNITS
 
 
@@ -125,7 +126,7 @@ def run_check(arguments: Namespace) -> int:
             return check_course(path, arguments.robots, os.environ.get("KINBOARD_EXERCISES"), arguments.json)
         return _check_exercise(path, arguments.robots, arguments.json)
     lines: list[str] = []
-    if path.suffix in (".urdf", ".xml", ".xacro"):
+    if path.suffix.lower() in XML:
         robot, report = _read(arguments)
         lines = ["", *report_lines(report)]
     else:

@@ -27,6 +27,7 @@ from kin import (
     pose_from_xyz_rpy,
 )
 from kin.collision.obstacles import checked_obstacles
+from kin.files.load import XML
 from kin.files.numbers import index_of
 from kin.frames import FRAMES
 from kin.ik import Task
@@ -52,7 +53,7 @@ def robot_of(arguments: Namespace) -> Robot:
 
 def named_robot(arguments: Namespace, named: str) -> Robot:
     """A robot by its id, or by the path of a file."""
-    if Path(named).suffix.lower() in (".urdf", ".xml", ".toml"):
+    if Path(named).suffix.lower() in (".toml", *XML):
         return load_robot(Path(named))
     return store_of(arguments).get(named)
 

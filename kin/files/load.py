@@ -11,7 +11,7 @@ from kin.files.read import load_toml, parse_robot
 from kin.files.urdf.read import read_urdf
 from kin.robot import Robot
 
-_XML = {".urdf", ".xml", ".mjcf", ".xacro"}
+XML = (".urdf", ".xml", ".mjcf", ".xacro")  # endings of files that hold a URDF or an MJCF model
 
 
 def load_robot(source: os.PathLike[str] | str, base: str | None = None, tip: str | None = None) -> Robot:
@@ -60,8 +60,8 @@ def load_robot(source: os.PathLike[str] | str, base: str | None = None, tip: str
 def _is_xml(path: Path) -> bool:
     """Whether a file is a URDF or an MJCF model: by its ending, or where that says nothing by its first letter."""
     ending = path.suffix.lower()
-    if ending == ".toml" or ending in _XML or not path.is_file():
-        return ending in _XML
+    if ending == ".toml" or ending in XML or not path.is_file():
+        return ending in XML
     try:
         with path.open("rb") as file:
             return file.read(1000).removeprefix(BOM_UTF8).lstrip().startswith(b"<")

@@ -724,6 +724,19 @@ def clouds():
 
 
 @pytest.mark.full
+@pytest.mark.parametrize("name", ["arm.mjcf", "ARM.URDF", "arm.Xml", "arm.TOML"])
+def test_an_arm_may_be_named_by_any_file_that_holds_one(capsys, tmp_path, name):
+    robot = kin.get_robot("planar2r")
+    text = {".mjcf": kin.robot_to_mjcf, ".toml": kin.robot_to_toml}.get(
+        Path(name).suffix.lower(), kin.robot_to_urdf
+    )
+    (tmp_path / name).write_text(text(robot))
+    for words in (("fk", str(tmp_path / name), "10", "20", "--json"), ("check", str(tmp_path / name), "--json")):
+        code, out, err = run(capsys, *words)
+        assert code == 0, err
+        assert json.loads(out)
+
+
 def test_workspace_tells_sizes(capsys):
     facts = kin.workspace.workspace_facts(PIONEER, effort=2)
     code, out, err = run(capsys, "workspace", "pioneer5", "--effort", 2)
