@@ -36,7 +36,7 @@ class DerivationError(RuntimeError):
 
 
 class NotDerivedError(DerivationError):
-    """The arm has more rows than equations are derived for."""
+    """Equations are not derived for such an arm: see `book_later`."""
 
 
 @dataclass(frozen=True)
@@ -217,10 +217,14 @@ def book_later(robot: Robot, limited: bool = False) -> Subscription[Book]:
         limited: raise `TooManyPendingError` instead of queueing behind too many derivations.
 
     Raises:
-        NotDerivedError: at once, for an arm with too many rows, or with rows that follow joints.
+        NotDerivedError: at once, for an arm with too many rows, or a row that turns by a part of a joint's angle.
     """
-    if robot.coupled:
-        raise NotDerivedError("equations are derived for arms in which every moving row is a joint")
+    kinds = {row.name: row.kind for row in robot.rows}
+    for row in robot.rows:
+        whole = row.ratio.is_integer() and kinds.get(row.follows) == "revolute"
+        if row.follows and row.kind == "revolute" and not whole:
+            expected = "rows that turn by whole multiples of a joint's angle"
+            raise NotDerivedError(f"equations are derived for {expected}, {row.name} does not")
     rows = len(robot.rows)
     if rows > MOST_ROWS:
         raise NotDerivedError(f"equations are derived for at most {MOST_ROWS} rows, this arm has {rows}")

@@ -23,6 +23,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from app.equations.expression import Expression, Name, Negative, Number, Sum, add, multiply, negative, size
 from app.equations.symbols import Symbol, Turn, length, trig
 from app.equations.typeset import glyphs
@@ -84,10 +86,13 @@ class _Link:
     def turn(self, turn: Turn) -> None:
         self.empty = False
         quarter = turn.constant / (math.pi / 2)
+        turn = turn if self._sign > 0 else turn.reversed
         if turn.joint < 0 and abs(quarter - round(quarter)) < 1e-15 * max(1.0, abs(quarter)):
             self._quarters += self._sign * round(quarter)
+        elif turn.reversed in self._turns:  # of a row that turns the joint's angle back
+            self._turns.remove(turn.reversed)
         else:
-            self._turns.append(turn if self._sign > 0 else turn.reversed)
+            self._turns.append(turn)
 
     def move(self, x: Any, y: Any, z: Any) -> None:
         self.empty = False
@@ -158,17 +163,15 @@ class _Derivation:
 
     def _walk(self) -> None:
         self._constant(self.robot.T_world_base, "b", "base")
-        q_index = 0
+        moving = iter(self.robot.expansion)
         for i, row in enumerate(self.robot.rows):
-            joint = -1
-            if row.kind != "fixed":
-                joint, q_index = q_index, q_index + 1
+            weights = next(moving) if row.moves else np.zeros(self.robot.n)
             if self.robot.convention == "modified":
                 self._twist(i, row)
                 self._link.move(self._length("a", i, row), 0, 0)
-                self._screw(i, row, joint)
+                self._screw(i, row, weights)
             else:
-                self._screw(i, row, joint)
+                self._screw(i, row, weights)
                 self._link.move(self._length("a", i, row), 0, 0)
                 self._twist(i, row)
         rows = len(self.robot.rows)
@@ -181,18 +184,23 @@ class _Derivation:
         self._close(rows)
         self._rotate(tool, "t", "tool", rows)
 
-    def _screw(self, i: int, row: Joint, joint: int) -> None:
+    def _screw(self, i: int, row: Joint, weights: Array) -> None:
+        """weights ``(n,)``: how often the value of each joint counts in that of the row."""
+        joint = int(np.argmax(np.abs(weights)))
         if row.kind == "revolute":
-            self._link.turn(Turn(str(joint + 1), 1, joint))
+            sign = 1 if weights[joint] > 0.0 else -1
+            for _ in range(abs(round(weights[joint]))):
+                self._link.turn(Turn(str(joint + 1), sign, joint))
         self._link.turn(Turn(f"β{i + 1}", 1, constant=row.theta))
         if row.kind != "prismatic":
             self._link.move(0, 0, self._length("d", i, row))
             return
-        weights = tuple(float(k == joint) for k in range(self.robot.n))
         meaning = f"travel of joint {joint + 1}, {row.name}"
+        if row.follows:
+            meaning = f"{row.ratio:g} times the value of joint {joint + 1}, {row.follows}"
         if row.d:
             meaning += f", plus {row.d:g} m"
-        self._link.move(0, 0, self.symbol(Symbol(f"d{i + 1}", "slide", weights, row.d, meaning)))
+        self._link.move(0, 0, self.symbol(Symbol(f"d{i + 1}", "slide", tuple(weights.tolist()), row.d, meaning)))
 
     def _length(self, letter: str, i: int, row: Joint) -> Any:
         value = row.d if letter == "d" else row.a

@@ -285,6 +285,23 @@ def test_any_arm_can_be_derived(seed, convention):
         assert np.allclose(read_mathml(text, values), values[equation.entry], rtol=0, atol=1e-12)
 
 
+def test_rows_that_follow_are_expanded():
+    assert latex_of("palletiser", "p_x") == r"c_{1}(a_{1} + a_{5} + a_{2}s_{2} + a_{4}c_{3}\right)"
+    rows = (
+        kin.Joint("a", 0.0, 0.1, 0.2, math.pi / 2, limits=(-1.5, 2.0)),
+        kin.Joint("b", 0.3, 0.0, 0.4, follows="a", ratio=-2.0),
+        kin.Joint("c", 0.0, 0.2, 0.1, 0.3, "prismatic", (0.0, 0.5)),
+        kin.Joint("d", 0.1, 0.3, 0.0, 0.7, "prismatic", follows="c", ratio=0.25),
+    )
+    robot = kin.Robot("own", "own", "", "standard", rows, (0.0, 0.0))
+    assert (
+        book(robot).symbols["d4"].meaning == "0.25 times the value of joint 2, c, plus 0.3 m"
+    )  # and it is checked
+    halved = replace(robot, rows=(rows[0], replace(rows[1], ratio=0.5), *rows[2:]))
+    with pytest.raises(NotDerivedError, match="whole multiples of a joint's angle, b does not"):
+        book(halved)
+
+
 def test_a_long_arm_is_cut_into_readable_pieces():
     rows = tuple(
         kin.Joint(f"row {i}", 0.0, 0.1, 0.2, (-1) ** i * math.pi / 2, "revolute", (-3.0, 3.0)) for i in range(16)

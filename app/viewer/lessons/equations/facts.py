@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from app.equations import Book, DerivationError, Equation, NotDerivedError, Values
+from app.equations import Book, DerivationError, Equation, Values
 from app.viewer.declared.facts import Facts
 from app.viewer.lessons.equations.settings import EquationsSettings
 from app.viewer.lessons.equations.views import segments, summary
@@ -31,8 +31,6 @@ class EquationsFacts(Facts[EquationsSettings]):
     def about(self) -> str:
         """Where the equations come from, or why there are none."""
         match self.work("book").error:
-            case NotDerivedError() as error:
-                return f"No equations for so many rows: {error}."
             case DerivationError() as error:
                 return f"No equations: {error}."
             case None:
