@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emitted import ROBOTS, STRICT, answer, exact, targets
+from emitted import FIRST, ROBOTS, STRICT, answer, exact, targets
 from numba import types
 
+from kin import builtin_robots
 from kin.codegen import files
 from kin.codegen.arm import arm_of
 from kin.codegen.families import alone, without_limits
@@ -174,3 +175,9 @@ def test_a_family_without_limits_has_nothing_that_they_would_decide():
         found = alone(robot, form)
         if found.rows is without_limits:
             assert found.needs_value or not form.redundancies(POSE)
+
+
+@pytest.mark.full
+def test_an_arm_of_each_solver_is_tested_with_the_full_set():
+    chosen = {(type(closed_form_of(robot := ROBOTS[robot_id])), robot.n) for robot_id in FIRST}
+    assert chosen == {(type(closed_form_of(robot)), robot.n) for robot in builtin_robots().values()}

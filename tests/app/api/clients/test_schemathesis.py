@@ -20,7 +20,7 @@ from app.shared.settings import Settings
 
 pytestmark = pytest.mark.full
 
-CASES = int(os.environ.get("KINBOARD_TEST_CASES", "12"))
+CASES = int(os.environ.get("KINBOARD_TEST_CASES", "6"))
 FEW = settings(
     max_examples=CASES, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
 )
