@@ -187,7 +187,7 @@
   const form = () => document.querySelector("[data-typed]");
   // The target's numbers where the tool has missed it, otherwise the tool's.
   const numbersOf = (row) => {
-    const shown = [...row.querySelectorAll(".kb-number")].map((node) => node.textContent);
+    const shown = [...row.querySelectorAll(".kb-number, data")].map((node) => node.textContent);
     return (row.dataset.target?.split(" ") ?? shown).map((text) => text.replace("−", "-"));
   };
 
@@ -196,11 +196,11 @@
     if (!box) return;
     box.hidden = false;
     box.dataset.typed = kind;
-    for (const node of box.querySelectorAll("[data-for]")) node.hidden = node.dataset.for !== kind;
+    for (const node of box.querySelectorAll("[data-for]")) node.hidden = !node.dataset.for.split(" ").includes(kind);
     const rows = kind === "pose" ? ["position", "angles"] : [kind];
     const input = box.querySelector("textarea");
     box.querySelector("[data-typed-frame]").value = "";
-    input.value = rows.map((name) => document.querySelector(`tr[data-type="${name}"]`)) // a row that a question asks for is not there
+    input.value = rows.map((name) => document.querySelector(`:is(tr, p)[data-type="${name}"]`)) // a row that a question asks for is not there
       .map((row) => (row ? numbersOf(row).join("  ") : "")).join("\n").trim();
     input.setAttribute("aria-label", box.querySelector(`b[data-for="${kind}"]`).textContent);
     showError("");
@@ -213,11 +213,14 @@
   function closeForm() {
     form().hidden = true;
     mark(false);
-    document.querySelector("button[data-type]")?.focus();
+    opener()?.focus();
   }
 
+  /** The button that opens the form. */
+  const opener = () => document.querySelector(form().dataset.typed === "pendant" ? "[data-pendant] button" : "button[data-type]");
+
   function mark(open) {
-    const button = document.querySelector("button[data-type]");
+    const button = opener();
     if (button) button.ariaExpanded = String(open);
   }
 
@@ -249,10 +252,10 @@
     if (button && button.ariaDisabled !== "true") send(button.dataset.send, button.dataset.argument);
     if (target.closest("[data-typed-send]")) sendForm();
     if (target.closest("[data-typed-close]")) closeForm();
-    const opener = target.closest("[data-type]");
-    if (!opener || (opener.localName === "tr" && !getSelection().isCollapsed)) return; // its numbers are being marked
-    if (opener.ariaExpanded === "true") closeForm();
-    else openForm(opener.dataset.type);
+    const pressed = target.closest("[data-type]");
+    if (!pressed || (pressed.localName !== "button" && !getSelection().isCollapsed)) return; // its numbers are being marked
+    if (target.closest("button")?.ariaExpanded === "true") closeForm();
+    else openForm(pressed.dataset.type);
   });
 
   addEventListener("change", (event) => {

@@ -51,7 +51,7 @@ def run(arguments: Namespace) -> int:
         return print_json(answer)
     units = Notation(robot, arguments.rad)
     values = to_pendant(robot, q) if arguments.pendant else q
-    limits = shown_limits(robot) if arguments.pendant else [joint.limits for joint in robot.joints]
+    limits = shown_limits(robot, q) if arguments.pendant else [joint.limits for joint in robot.joints]
     rows = [
         [
             joint.name,

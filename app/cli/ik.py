@@ -110,8 +110,6 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
         raise InputError("--targets", arguments.targets, f"no --{turned}: the file has the orientations")
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
-    if arguments.pendant:
-        raise InputError("--pendant", "with --targets", "one target, or kin.motors.to_pendant")
     q_seed = (
         None
         if arguments.seed is None
@@ -123,7 +121,8 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
         return _run_rows(robot, arguments, units, q_seed)
     options = _options(robot, arguments, units, "pose" if arguments.mask else arguments.task or "pose")
     table = PoseTable.named(arguments.form)
-    question = Question(robot, options, frame_of(robot, arguments, q_seed), q_seed, table, arguments.strict)
+    frame, strict, pendant = frame_of(robot, arguments, q_seed), arguments.strict, arguments.pendant
+    question = Question(robot, options, frame, q_seed, table, strict, pendant)
     try:
         count, solved, invalid = solve_file(
             question, Path(arguments.targets), Path(arguments.output), arguments.dask
@@ -158,7 +157,8 @@ def _run_rows(robot: Robot, arguments: Namespace, units: Units, q_seed: Array | 
         return frame_of(robot, arguments, q_seed, name)
 
     table = PoseTable.named(arguments.form)
-    question = RowsQuestion(robot, q_seed, cache(options), cache(frame), table, arguments.strict)
+    strict, pendant = arguments.strict, arguments.pendant
+    question = RowsQuestion(robot, q_seed, cache(options), cache(frame), table, strict, pendant)
     count, solved, invalid = solve_rows(question, arguments.targets, arguments.output or "-", arguments.format)
     said = invalid_rows(invalid, "target")
     if arguments.output not in (None, "-"):

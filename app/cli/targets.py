@@ -50,6 +50,7 @@ class Question:
         q_seed: ``(n,)``, None for the home configuration.
         table: the columns of targets in tables.
         strict: whether the first row that is no target ends the run.
+        pendant: whether joint values are written as the arm's pendant shows them.
     """
 
     robot: Robot
@@ -58,11 +59,12 @@ class Question:
     q_seed: Array | None
     table: PoseTable
     strict: bool
+    pendant: bool
 
     def answers(self, targets: list[Target]) -> Answers:
         """The answers to some targets."""
         placed = [each._replace(T=self.frame @ each.T) for each in targets]
-        return answered(self.robot, placed, self.options, self.q_seed, self.strict)
+        return answered(self.robot, placed, self.options, self.q_seed, self.strict, self.pendant)
 
     def key(self, source: Path, output: Path) -> str:
         """A digest of the question, the file of targets and the kind of output."""
@@ -70,7 +72,7 @@ class Question:
         seed = None if self.q_seed is None else self.q_seed.tolist()
         asked = (robot.convention, robot.rows, robot.base, robot.tool, robot.home, self.options, seed)
         where = (self.frame.tolist(), str(source.resolve()), stat.st_size, stat.st_mtime_ns, output.suffix.lower())
-        read = (self.table.form.key, self.strict)
+        read = (self.table.form.key, self.strict, self.pendant and robot.pendant)
         return hashlib.sha256(repr((*asked, *where, *read)).encode()).hexdigest()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.named import robot_of
@@ -60,15 +59,17 @@ def from_pendant(robot: Robot | str, shown: ArrayLike) -> Array:
     return values if found is None else found.joint_values(values)
 
 
-def shown_limits(robot: Robot) -> list[tuple[float, float] | None]:
-    """The limits of each joint as its pendant shows them; None without any, or where other joints move them."""
+def shown_limits(robot: Robot, q: Array) -> list[tuple[float, float] | None]:
+    """The limits of each joint as its pendant shows them with the others at q ``(n,)``; None without any.
+
+    Where other joints count in what is shown, as in FANUC's J3, the limits move with them.
+    """
+    limits, own = [joint.limits for joint in robot.joints], robot.pendant_map
+    if own is None:
+        return limits
     found: list[tuple[float, float] | None] = []
-    for i, joint in enumerate(robot.joints):
-        own = robot.pendant_map
-        if joint.limits is None or own is None:
-            found.append(joint.limits)
-            continue
-        others = np.delete(own.B[i], i).any()
-        low, high = sorted(own.B[i, i] * limit + own.c[i] for limit in joint.limits)
-        found.append(None if others else (float(low), float(high)))
+    for i, given in enumerate(limits):
+        rest = float(own.shown(q)[i] - own.B[i, i] * q[i])
+        low, high = sorted(float(own.B[i, i]) * limit + rest for limit in given or (0.0, 0.0))
+        found.append((low, high) if given is not None and low < high else None)
     return found

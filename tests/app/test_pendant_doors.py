@@ -47,7 +47,8 @@ def test_a_sent_arm_brings_its_pendant_and_what_follows(client: TestClient) -> N
 def test_the_command_line_reads_and_prints_values_of_the_pendant(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["fk", "lrmate200id", "--pendant", *map(str, SHOWN)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert next(line for line in lines if line.startswith("J3")).split() == ["J3", "0.000°"]
+    third = next(line for line in lines if line.startswith("J3"))
+    assert third.split() == ["J3", "0.000°", "-100.000°", "…", "175.000°"], "its limits at 30° of J2"
     T = kin.fk(ROBOT, Q)
     position, wxyz = T[:3, 3] * 1000.0, kin.wxyz_from_rotation(T[:3, :3])
     place = ["--position", *map(repr, position.tolist()), "--wxyz", *map(repr, wxyz.tolist())]

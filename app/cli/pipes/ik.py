@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from app.cli.pipes.poses import INVALID, NOTHING, Counted, PoseTable, Target, Wrong, answered
 from app.cli.pipes.sink import Sink, form_of, opened_sink
 from app.cli.pipes.source import Goal, opened_source
-from app.shared.answers.ik import IkAnswer, ik_answer
+from app.shared.answers.ik import IkAnswer, add_pendant, ik_answer
 from kin import IKOptions, InputError, Robot, Status
 from kin.ik import Task, solve
 from kin.ik.problem import read_pose
@@ -35,6 +35,7 @@ class RowsQuestion:
         frame: T_world_frame ``(4, 4)`` of a name; None for that of ``--frame``.
         table: the columns of targets in tables.
         strict: whether the first row that is no target ends the run.
+        pendant: whether joint values are written as the arm's pendant shows them.
     """
 
     robot: Robot
@@ -43,12 +44,13 @@ class RowsQuestion:
     frame: Callable[[str | None], Array]
     table: PoseTable
     strict: bool
+    pendant: bool
 
     def best(self, goals: list[Goal]) -> Iterator[tuple[str, Array, str]]:
         """Status, best solution ``(n,)`` and reason of each target."""
         for task, group in groupby(goals, lambda goal: goal.task):
             targets = [Target(goal.place, *self._placed(goal)[::2]) for goal in group]
-            found = answered(self.robot, targets, self.options(task, 1), self.q_seed, self.strict)
+            found = answered(self.robot, targets, self.options(task, 1), self.q_seed, self.strict, self.pendant)
             yield from zip(found.status, found.q, found.reason, strict=True)
 
     def answers(self, goals: list[Goal]) -> Iterator[IkAnswer | dict[str, Any]]:
@@ -57,7 +59,10 @@ class RowsQuestion:
             T, rounding, wrong = self._placed(goal)
             if wrong is None:
                 try:
-                    yield ik_answer(solve(self.robot, T, self.options(goal.task, None), self.q_seed, rounding))
+                    found = ik_answer(solve(self.robot, T, self.options(goal.task, None), self.q_seed, rounding))
+                    if self.pendant:
+                        add_pendant(self.robot, found)
+                    yield found
                     continue
                 except InputError as error:
                     if not error.field.startswith("target"):

@@ -132,9 +132,9 @@ class Counted(NamedTuple):
 
 
 def answered(
-    robot: Robot, targets: Sequence[Target], options: IKOptions, q_seed: Array | None, strict: bool
+    robot: Robot, targets: Sequence[Target], options: IKOptions, q_seed: Array | None, strict: bool, pendant: bool
 ) -> Answers:
-    """The answers to targets in the frame of the robot.
+    """The answers to targets in the frame of the robot; `pendant`: with joint values as its pendant shows them.
 
     Raises:
         InputError: an option that does not fit the arm; with `strict`, the first row that is no target.
@@ -161,6 +161,8 @@ def answered(
         for k, i in enumerate(good):
             status[i] = found.status[k].value
             reason[i] = "" if found.status[k] is Status.SOLVED else found[k].reason
+    if pendant and robot.pendant_map is not None:
+        q = robot.pendant_map.shown(q)
     return Answers(q, tuple(status), tuple(reason))
 
 

@@ -21,6 +21,9 @@ from typing import Final, Generic, TypeVar
 
 import viser
 
+from app.viewer.panel import assign
+from app.viewer.viser_patches import show_value
+
 QUESTION: Final = "kinboard"  # a key of the browser's storage that is never set: any answer will do
 ANSWER_WITHIN: Final = 30.0  # s; a page in the background does not answer
 HELD_BACK: Final = 0.06  # s for which viser may hold back the change of a control, and a bit more
@@ -134,3 +137,33 @@ class Crossings(Generic[K]):
         self._sent.clear()
         self._crossed.clear()
         self._moved.clear()
+
+
+class SliderCrossings(Crossings[K]):
+    """Sliders whose values may cross.
+
+    Args:
+        slider: the slider of a key.
+    """
+
+    def __init__(self, fence: Fence, slider: Callable[[K], viser.GuiSliderHandle[float]]) -> None:
+        super().__init__(fence, self._show_again)
+        self._slider = slider
+        self._meant: dict[K, float] = {}  # what each slider is to show, also while it is held
+
+    def set(self, key: K, value: float, held: bool = False) -> None:
+        """Set a slider; one that the visitor holds shows the value when it is released."""
+        self._meant[key] = value
+        slider = self._slider(key)
+        if not held and value != slider.value:
+            assign(slider, value)
+            self.sent([key])
+
+    def clear(self) -> None:
+        """The sliders are removed."""
+        super().clear()
+        self._meant.clear()
+
+    def _show_again(self, key: K) -> None:
+        slider = self._slider(key)
+        show_value(slider, self._meant.get(key, slider.value), again=True)

@@ -13,22 +13,22 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.viewer.panel import Post, assign, listen, listen_click, update_html
+from app.viewer.panel import Post, listen, listen_click, update_html
 from app.viewer.panel.entry import read_value
-from app.viewer.panel.fence import Crossings, Fence
+from app.viewer.panel.fence import Fence, SliderCrossings
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
-from app.viewer.viser_patches import show_value
 from kin import InputError, Robot
 from kin.files.numbers import index_of
-from kin.motors import to_pendant
+from kin.motors import from_pendant, to_pendant
 from kin.transforms import Array
-from kin.typed import EntryError
+from kin.typed import EntryError, ReadError, elements, interpret, read_element
 from kin.units import Unit, Units, general
 
 DIGITS = 2
+_SLACK = 1e-9  # rad or m by which a typed value may be outside the limits
 REMEMBERED = 200  # fields of sliders, also of those that were replaced
 # Marks the label of a locked joint; invisible. static/input.js presses such a button, on which viewer.css draws a
 # padlock.
@@ -67,7 +67,7 @@ def pendant_html(robot: Robot, q: Array, units: Units) -> str:
     """What the pendant of an arm shows at a configuration ``(n,)``."""
     turning = robot.revolute.tolist()
     values = [
-        (joint.name, units.of(turns).text(value))
+        (joint.name, units.of(turns).number(value), units.of(turns).suffix)
         for joint, turns, value in zip(robot.joints, turning, to_pendant(robot, q).tolist(), strict=True)
     ]
     return render("panel/pendant", values=values)
@@ -100,8 +100,8 @@ class JointSliders:
         self.robot = robot
         self._units = units
         self._held = 0  # index of the folder whose slider was moved last
-        self._crossings = Crossings[tuple[int, int]](fence, self._show_again)  # by folder and joint
-        self._meant: dict[tuple[int, int], float] = {}  # what each slider is to show, also while it is held
+        # By folder and joint.
+        self._crossings = SliderCrossings[tuple[int, int]](fence, lambda key: self._sliders[key[0]][key[1]])
         if before is not None:  # what was sent to a slider is on its way to the one that replaces it
             self._crossings.sent(itertools.product(range(len(folders)), range(robot.n)))
         # Of each field: index and kind of its joint, and the unit of what is typed there.
@@ -159,6 +159,34 @@ class JointSliders:
         limits = self.robot.joints[index].limits or (-math.pi, math.pi)
         return read_value(text, f"Joint {index + 1}", unit, limits)
 
+    def read_pendant(self, text: str) -> Array:
+        """The configuration ``(n,)`` of which the pendant shows what was typed.
+
+        Raises:
+            EntryError: it is no list of as many numbers as there are joints, or not within the limits.
+        """
+        robot, units, title = self.robot, [self._unit(i) for i in range(self.robot.n)], "The joints were not moved"
+
+        def evaluate(way: str) -> Array:
+            words = elements(way)
+            if len(words) != robot.n:
+                raise ReadError(f"found {len(words)} numbers; valid are {robot.n}, one for each joint")
+            return np.array(list(map(read_element, words, units)))
+
+        try:
+            shown = interpret(text, evaluate, np.array_equal)
+        except ReadError as error:
+            raise EntryError(title, error.sentence, error.readings) from None
+        q = from_pendant(robot, shown)
+        for joint, unit, value in zip(robot.joints, units, q.tolist(), strict=True):
+            low, high = joint.limits or (-math.pi, math.pi)
+            if not low - _SLACK <= value <= high + _SLACK:
+                valid = f"Valid: {unit.number(low)} … {unit.text(high)}."
+                raise EntryError(
+                    title, f"Joint {joint.name} would have {unit.text(value)}, outside its limits. {valid}"
+                )
+        return robot.clip(q)
+
     def read(self, index: int, value: object, place: int = 0) -> float:
         """A slider's value in radians or metres, within the limits; raises `InputError` for anything else.
 
@@ -179,17 +207,10 @@ class JointSliders:
         """
         for place, sliders in enumerate(self._sliders):
             for i, slider in enumerate(sliders):
-                self._meant[place, i] = value = self._value(slider, i, q)
                 held = i == dragged and place == self._held and slider.min <= slider.value <= slider.max
-                if not held and value != slider.value:
-                    assign(slider, value)
-                    self._crossings.sent([(place, i)])
+                self._crossings.set((place, i), self._value(slider, i, q), held)
         for html in self._pendants:
             update_html(html, pendant_html(self.robot, q, self._units))
-
-    def _show_again(self, key: tuple[int, int]) -> None:
-        slider = self._sliders[key[0]][key[1]]
-        show_value(slider, self._meant.get(key, slider.value), again=True)
 
     def _value(self, slider: viser.GuiSliderHandle[float], i: int, q: Array) -> float:
         """What the slider of joint i shows at a configuration ``(n,)``."""

@@ -13,11 +13,10 @@ import viser
 
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.entry import read_value
-from app.viewer.panel.fence import Crossings, Fence
+from app.viewer.panel.fence import Fence, SliderCrossings
 from app.viewer.panel.fields import field, fields_html, limit_marks
 from app.viewer.panel.part import Block, add_html
 from app.viewer.views.templates import render
-from app.viewer.viser_patches import show_value
 from kin import InputError, Robot, branch_names
 from kin.ik import Redundancy, branch_meanings
 from kin.units import DEFAULT_UNITS, Unit, Units
@@ -118,8 +117,7 @@ class RedundancySliders:
         self._tracks: dict[str, Block] = {}
         self._html: Block | None = None
         self._uuids: dict[str, str] = {}
-        self._crossings = Crossings[str](fence, self._show_again)
-        self._meant: dict[str, float] = {}  # what each slider is to show, also while it is held
+        self._crossings = SliderCrossings[str](fence, lambda name: self._sliders[name])
         self._unit = DEFAULT_UNITS.angles
 
     def show(
@@ -135,10 +133,8 @@ class RedundancySliders:
         for parameter in parameters:
             slider = self._sliders[parameter.name]
             item = on_side_of(slider.value, parameter, self._unit)
-            self._meant[item.name] = value = min(max(self._unit.shown(item.value), slider.min), slider.max)
-            if item.name != dragged and value != slider.value:
-                assign(slider, value)
-                self._crossings.sent([item.name])
+            value = min(max(self._unit.shown(item.value), slider.min), slider.max)
+            self._crossings.set(item.name, value, item.name == dragged)
             track = feasible_html(item, float(slider.min), float(slider.max), self._unit)
             update_html(self._tracks[item.name], track)
 
@@ -164,10 +160,6 @@ class RedundancySliders:
             raise InputError(name, value, "a finite number")
         self._crossings.heard(name)
         return self._unit.read(float(value))
-
-    def _show_again(self, name: str) -> None:
-        slider = self._sliders[name]
-        show_value(slider, self._meant.get(name, slider.value), again=True)
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""

@@ -398,6 +398,24 @@ def test_configurations_may_be_as_the_pendant_shows_them(run):
     assert again == out
 
 
+def test_solutions_may_be_as_the_pendant_shows_them(run, tmp_path):
+    arm, q = kin.get_robot("lrmate200id"), np.radians([[0, 10, 20, 0, -90, 0], [5, 30, 50, 0, -90, 0]])
+    np.save(tmp_path / "in.npy", kin.fk(arm, q))
+    shown = kin.motors.to_pendant(arm, kin.solve_ik_many(arm, kin.fk(arm, q)).q)
+    asked = "ik", arm.id, "--pendant", "--targets", tmp_path / "in.npy"
+    for words in (("--format", "npy"), ("-o", tmp_path / "out.npy")):
+        code, out, err = run(*asked, *words)
+        assert code == 0, err
+        written = out if "--format" in words else (tmp_path / "out.npy").read_bytes()
+        assert np.load(io.BytesIO(written)) == pytest.approx(shown, abs=1e-12)
+    _, answers, _ = run(*asked, "--format", "ndjson")
+    for line, each in zip(answers.splitlines(), shown, strict=True):
+        assert json.loads(line)["solutions"][0]["pendant"] == pytest.approx(each, abs=1e-9)
+    _, table, _ = run(*asked, "--format", "csv")
+    _, poses, _ = run("fk", arm.id, "--pendant", "--configurations", "-", "--format", "npy", given=table)
+    assert np.load(io.BytesIO(poses)) == pytest.approx(kin.fk(arm, q), abs=1e-9)
+
+
 def test_rows_that_end_in_a_space_and_empty_lines_before_a_table_are_read_from_files_too(run, tmp_path):
     (tmp_path / "in.csv").write_text("\n# a comment\n0.4 0.1 0.3 0 1 0 0 \n")
     code, _, err = run("ik", "ur5", "--targets", tmp_path / "in.csv", "-o", tmp_path / "out.csv")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -99,8 +100,24 @@ def test_a_link_carries_what_follows_and_the_pendant() -> None:
 def test_the_page_shows_what_the_pendant_shows(tab: FakeBrowser) -> None:
     fanuc = kin.get_robot("lrmate200id")
     tab.choose(fanuc.name)
-    assert "Pendant: J1 0.0°, J2 0.0°, J3 0.0°" in tab.html
+
+    def said() -> str:
+        return re.sub("<.*?>", "", tab.html).replace("\u2212", "-")
+
+    assert "Pendant: J1 0.0°, J2 0.0°, J3 0.0°" in said()
     tab.set("2 J2", 30.0)
-    tab.wait(lambda: "J2 30.0°, J3 -30.0°" in tab.html.replace("\u2212", "-"))
+    tab.wait(lambda: "J2 30.0°, J3 -30.0°" in said())
+    tab.say("target", ["pendant", "[0, 30, 0; 0 -pi/2 rad 0]"])
+    tab.wait(lambda: "J2 30.0°, J3 0.0°, J4 0.0°, J5 -90.0°" in said())
+    assert tab.value("3 J3") == 30.0
+    for text, words in (
+        ("0 30 0", "Found 3 numbers; valid are 6, one for each joint"),
+        ("0 30 190 0 0 0", "Joint J3 would have 220.0°, outside its limits. Valid: -70.0 … 205.0°."),
+        ("0 30 x 0 0 0", "“x” is not a number"),
+    ):
+        number = tab.say("target", ["pendant", text])
+        tab.wait(lambda number=number: tab.script["reply"][0] == number)
+        assert words in tab.script["reply"][1].replace("\u2212", "-")
+    assert tab.value("3 J3") == 30.0
     tab.choose(ROBOT.name)
-    assert "Pendant:" not in tab.html
+    assert "Pendant:" not in said()

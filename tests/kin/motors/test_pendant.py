@@ -46,9 +46,12 @@ def test_a_file_states_a_linear_map_of_the_joint_values(tmp_path):
     assert kin.motors.from_pendant(robot, shown) == pytest.approx([0.2, 0.4, 0.03], abs=1e-15)
     q = robot.random_q(np.random.default_rng(1), (3, 4))
     assert kin.motors.from_pendant(robot, kin.motors.to_pendant(robot, q)) == pytest.approx(q, abs=1e-15)
-    assert shown_limits(robot)[0] == pytest.approx(np.radians([-45, 90]))
-    assert shown_limits(robot)[1] is None, "where other joints move them"
-    assert shown_limits(robot)[2] == pytest.approx((0.01, 0.21))
+    limits = shown_limits(robot, np.array([0.2, 0.4, 0.03]))
+    assert limits[0] == pytest.approx(np.radians([-45, 90]))
+    ends = [kin.motors.to_pendant(robot, [0.2, end, 0.03])[1] for end in robot.joints[1].limits]
+    assert limits[1] == pytest.approx(sorted(ends)), "other joints move them"
+    assert limits[2] == pytest.approx((0.01, 0.21))
+    assert shown_limits(kin.get_robot("ur5"), np.zeros(6))[0] == kin.get_robot("ur5").joints[0].limits
     kin.save_robot(robot, tmp_path / "again.toml")
     assert kin.load_robot(tmp_path / "again.toml").pendant == robot.pendant
     assert np.array_equal(kin.fk(robot, q), kin.fk(replace(robot, pendant=()), q)), "no pose depends on it"

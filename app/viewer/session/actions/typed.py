@@ -64,14 +64,21 @@ class TypedInput:
         self._page.status.show(BY_HAND)
 
     def set_target(self, number: int, value: object) -> None:
-        """A typed target."""
+        """A typed target, or what the pendant shows of the joints."""
         match value:
             case [("position" | "angles" | "quaternion" | "pose") as kind, str(text)]:
                 self._answer(number, lambda: self._set_target(kind, text, False))
             case [("position" | "angles" | "quaternion" | "pose") as kind, str(text), "tool"]:
                 self._answer(number, lambda: self._set_target(kind, text, True))
+            case ["pendant", str(text)]:
+                self._answer(number, lambda: self._set_pendant(text))
             case _:
                 raise kin.InputError("target", value, 'what was typed, a text, and "tool" if it is relative to it')
+
+    def _set_pendant(self, text: str) -> None:
+        """Joint values as the arm's pendant shows them."""
+        self._page.arm.move_to(self._page.sliders.read_pendant(text))
+        self._page.status.show(BY_HAND)
 
     def _set_target(self, kind: PoseKind, text: str, relative: bool) -> None:
         """Typed numbers are in the frame of the read-out, or `relative` to the tool."""
