@@ -328,6 +328,18 @@ def test_a_mimic_joint_that_cannot_be_followed_is_named(mimic, field, valid):
     assert caught.value.field == field
 
 
+def test_limits_of_a_finger_that_turns_back_do_not_hold_the_joint_that_it_follows():
+    """As of Robotiq's 2F-85: both joints from 0 up, although one is −1 times the other."""
+    text = urdf_of(
+        'j1|revolute|<limit lower="0" upper="0.8"/>',
+        'j2|revolute|<limit lower="0" upper="0.8757"/><mimic joint="j1" multiplier="-1"/>',
+    ).replace('<link name="l3"/>', "")
+    robot, report = kin.files.read_urdf(text)
+    assert robot.joints[0].limits == (0.0, 0.8)
+    assert report.notes == ("Joint j2 has limits that leave j1, which it follows, one value: they are not kept.",)
+    assert kin.doctor.examine_urdf(text).arm.robot == robot
+
+
 def test_an_equality_of_mjcf_counts_from_the_first_configuration():
     def mjcf(polycoef: str) -> str:
         return f"""<mujoco><compiler angle="radian"/><worldbody><body name="a">

@@ -178,6 +178,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     followers = followers_of(tree, chain)
     joints = [_joint(joint, notes, followers, tree.terms) for joint in moving]
     joints = [_in_place(joint, tree, followers, notes) for joint in joints]
+    joints = [_with_range(joint, joints, notes) for joint in joints]
     notes += _ignored(tree, chain)
     table = table_of_chain(joints, _transforms(chain, followers))
     rows = _with_distinct_tilts(table.rows)
@@ -369,6 +370,23 @@ def _in_place(joint: Joint, tree: UrdfTree, followers: Followers, notes: list[st
         expected = f"limits that those of {leader.name}, which it follows, leave a value"
         raise RobotFileError(tree.file, f"joint {joint.name}: limit", text, expected)
     return replace(joint, limits=limits)
+
+
+def _with_range(joint: Joint, joints: Sequence[Joint], notes: list[str]) -> Joint:
+    """A follower without limits that leave its leader one value only.
+
+    Makers write such ones for fingers that turn back by a multiplier of −1, with limits from 0 up for all joints.
+    """
+    leader = next((each for each in joints if each.name == joint.follows), None)
+    if leader is None or leader.limits is None or joint.limits is None:
+        return joint
+    low, high = sorted(limit / joint.ratio for limit in joint.limits)
+    if leader.limits[0] == leader.limits[1] or max(low, leader.limits[0]) != min(high, leader.limits[1]):
+        return joint
+    notes.append(
+        f"Joint {joint.name} has limits that leave {leader.name}, which it follows, one value: they are not kept."
+    )
+    return replace(joint, limits=None)
 
 
 def _leaders(tree: UrdfTree, joints: Sequence[Joint]) -> tuple[Joint, ...]:
