@@ -19,6 +19,10 @@ HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 # Expensive tests run over these, cheap ones over the whole library. Older trees, which the differential test asks
 # about these arms, have no others.
 CLASSICS = tuple(getattr(kin.files, "classic_robots", kin.builtin_robots)().values())
+ONE_OF_EACH_SOLVER = (  # and count of joints
+    "pioneer5", "redundant7", "redundant7-craig", "irb120", "panda", "planar2r", "planar3r", "scara", "stanford",
+    "ur5", "gofa", "gen3", "so100", "gantry", "palletiser", "prr", "rpp", "rrp",
+)  # fmt: skip
 CHAPTER_ARMS = ("pioneer5", "redundant7", "redundant7-craig")
 
 

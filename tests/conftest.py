@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from arms import ONE_OF_EACH_SOLVER
 from hypothesis import settings
 from playwright.sync_api import Browser, sync_playwright
 
@@ -63,19 +64,20 @@ assert not (moved := [str(file) for file in LONG if not file.exists()]), moved
 # Without --all, a test of each built-in arm runs for these: in tests/kin for one of each family of closed forms,
 # elsewhere, where a closed form is a black box, for some with five to seven joints and one with a slide.
 ONE_OF_EACH_FAMILY = frozenset(robot.id for robot in one_of_each_family())
+# Of tests that generate code, or a page with code, for each arm, those of other arms are slow ones.
+GENERATING = ("test_exact.py", "test_generated_files.py", "test_takehome.py", "test_takehome_solver.py")
 SOME = frozenset({"pioneer5", "redundant7-craig", "puma560", "scara"})
 
 
-def stands_for_others(item: pytest.Item) -> bool:
-    """Whether a test is of no built-in arm, or of one that stands for the others."""
+def arms_of(item: pytest.Item) -> set[str]:
+    """The ids of the built-in arms that a test is of."""
     values = (
         item.callspec.params.values() if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ()
     )
     ids = {
         each.id if isinstance(each, kin.Robot) else each for each in values if isinstance(each, kin.Robot | str)
     }
-    chosen = ONE_OF_EACH_FAMILY if item.path.is_relative_to(TESTS / "kin") else SOME
-    return ids & kin.builtin_robots().keys() <= chosen
+    return ids & kin.builtin_robots().keys()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -98,8 +100,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     Then files of `kin`, which compute, take turns with those that often wait.
     """
     for item in items:
-        if not stands_for_others(item):
+        arms = arms_of(item)
+        if not arms <= (ONE_OF_EACH_FAMILY if item.path.is_relative_to(TESTS / "kin") else SOME):
             item.add_marker(pytest.mark.full)
+        if item.path.name in GENERATING and not arms <= set(ONE_OF_EACH_SOLVER):
+            item.add_marker(pytest.mark.slow)
     files = list(dict.fromkeys(item.path for item in items))
     computing = {path for path in files if path.is_relative_to(TESTS / "kin")}
     place = {}

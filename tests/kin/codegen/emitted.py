@@ -52,12 +52,6 @@ def _made_up() -> dict[str, Robot]:
     return {name: replace(robot, id=f"made-up-{name}") for name, robot in found.items()}
 
 
-# One built-in arm of each solver and count of joints. Tests of the others are marked `slow`: each compiles files,
-# `test_exact.py` three an arm.
-FIRST = (
-    "pioneer5", "redundant7", "redundant7-craig", "irb120", "panda", "planar2r", "planar3r", "scara", "stanford",
-    "ur5", "gofa", "gen3", "so100", "gantry", "palletiser", "prr", "rpp", "rrp",
-)  # fmt: skip
 ROBOTS = kin.builtin_robots() | {robot.id: robot for robot in _made_up().values()}
 
 
