@@ -203,6 +203,7 @@ def test_cover_says_why_a_page_waits(browser: Browser, address: str) -> None:
     page.close()
 
 
+@pytest.mark.full
 def test_cover_says_that_a_script_failed(browser: Browser, address: str) -> None:
     page = browser.new_page()
     page.add_init_script("window.Worker = class { constructor() { throw new Error('no workers here'); } }")

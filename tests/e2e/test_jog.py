@@ -79,7 +79,7 @@ class LinkTab(Tab):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("tilt", [1.0, 15.0])
+@pytest.mark.parametrize("tilt", [1.0, pytest.param(15.0, marks=pytest.mark.slow)])
 def test_an_arc_seen_edge_on_turns_with_the_pointer(browser: Browser, address: str, tilt: float) -> None:
     T, radius = kin.fk(UR5, UR5.q_home), ARC * GIZMO * body(UR5).radius
     above, aside, turned = math.radians(tilt), math.radians(35.0), math.radians(25.0)

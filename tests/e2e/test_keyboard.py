@@ -253,7 +253,7 @@ def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is
         shown.open("Move")
 
 
-@pytest.mark.full
+@pytest.mark.slow
 def test_the_overview_of_keys_is_dark_on_a_dark_page(tab: Tab) -> None:
     colours = "node => [getComputedStyle(node).backgroundColor, getComputedStyle(node).color]"
     for dark in (True, False):

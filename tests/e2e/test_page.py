@@ -88,6 +88,7 @@ def test_the_page_follows_the_colours_of_the_system(tab: Tab) -> None:
     expect(page.get_by_text("The system is dark")).not_to_be_visible()
 
 
+@pytest.mark.full
 def test_a_picture_is_offered_and_the_settings_of_viser_are_not(desktop: Tab, tmp_path: Path) -> None:
     tab = desktop
     with tab.page.expect_download() as download:
@@ -158,6 +159,7 @@ def test_a_press_hides_the_hint(desktop: Tab) -> None:
     expect(hint).to_be_visible()
 
 
+@pytest.mark.full
 def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
     tab = desktop
     width = "document.querySelector('[data-dock-region=right]').offsetWidth"
@@ -235,7 +237,9 @@ CUT = """() => [...document.querySelectorAll("[data-arm] table input:not(.kb-arm
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("robot", "longest"), [("panda", "−166.003062"), ("ur5", "−392.25")])
+@pytest.mark.parametrize(
+    ("robot", "longest"), [("panda", "−166.003062"), pytest.param("ur5", "−392.25", marks=pytest.mark.slow)]
+)
 def test_no_number_of_an_arm_s_tables_is_cut(desktop: Tab, robot: str, longest: str) -> None:
     desktop.select(kin.get_robot(robot))
     desktop.open("Robot")

@@ -194,6 +194,7 @@ def test_a_click_in_the_chart_of_postures_starts_there(ur5: Tab) -> None:
     expect(rows.nth(1)).to_contain_text("Arrives in another posture")
 
 
+@pytest.mark.full
 def test_a_button_that_is_held_while_the_list_is_sent_again_is_pressed(ur5: Tab) -> None:
     """What was typed before is sent when the button takes the focus; the answer comes before it is released."""
     rows = open_file(ur5, list(LINE))

@@ -155,7 +155,9 @@ def orbit(page: Page, right: int, down: int) -> None:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("said", "opened"), [("", "Learn"), ("&tab=Move", "Move"), ("&tab=Robot", "Robot")])
+@pytest.mark.parametrize(
+    ("said", "opened"), [pytest.param("", "Learn", marks=pytest.mark.slow), ("&tab=Robot", "Robot")]
+)
 def test_a_link_to_a_lesson_opens_it(browser: Browser, address: str, said: str, opened: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.goto(f"{address}viewer/#s={encode(PageState(PIONEER.id, lesson='dh'))}{said}")

@@ -65,6 +65,7 @@ def test_a_length_typed_right_after_the_kind_of_a_joint_stays(tab: Tab, address:
     expect(page.locator('[data-cell="2 kind"]')).to_have_value("prismatic")
 
 
+@pytest.mark.full
 def test_the_place_of_an_obstacle_typed_faster_than_the_page_answers_is_used(tab: Tab, address: str) -> None:
     page, texts = tab.page, {"x": "321", "y": "-456", "z": "234"}
     page.get_by_text("Obstacles", exact=True).click()

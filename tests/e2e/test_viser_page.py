@@ -135,6 +135,7 @@ class WorkerTab(Tab):
     scripts = Tab.scripts + KEEP_WORKER
 
 
+@pytest.mark.full
 def test_updates_of_a_component_that_is_removed_before_the_next_frame_are_dropped(
     browser: Browser, address: str
 ) -> None:
@@ -362,10 +363,12 @@ RESIZED = """async () => {
 }"""
 
 
+@pytest.mark.full
 def test_a_picture_of_another_resolution_is_drawn_at_once(desktop: Tab) -> None:
     assert desktop.page.evaluate(RESIZED) >= 1
 
 
+@pytest.mark.full
 def test_typing_into_a_menu_replaces_the_name_that_is_chosen(desktop: Tab) -> None:
     page, field = desktop.page, desktop.row("Robot").locator("input:visible").first
     chosen = field.input_value()

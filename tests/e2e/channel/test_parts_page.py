@@ -116,6 +116,7 @@ def test_what_is_typed_in_one_question_stays_where_another_one_is_answered(page:
     expect(field).to_have_value("")  # the service has acted on it
 
 
+@pytest.mark.full
 def test_a_table_that_is_being_typed_stays_where_the_comparison_is_set(page: Page) -> None:
     page.get_by_role("tab", name="Robot").click()
     page.locator("#kb-arm-other").select_option("typed")

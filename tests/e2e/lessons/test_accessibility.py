@@ -296,6 +296,7 @@ def test_no_control_with_the_focus_is_covered(phone: Tab) -> None:
     assert covered == []
 
 
+@pytest.mark.full
 def test_the_measures_find_what_is_wrong(tab: Tab) -> None:
     tab.page.evaluate("""() => {
         const made = document.createElement("div");

@@ -119,7 +119,13 @@ def sheet_of(lesson: type[Lesson], robot: kin.Robot) -> str:
     return page_html(Sheet(lesson.title, robot, robot.q_home, DEFAULT_UNITS, outline.goal, parts, (), left))
 
 
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+@pytest.mark.parametrize(
+    "lesson",
+    [
+        pytest.param(each, id=each.key, marks=() if i % 3 == 0 else pytest.mark.slow)
+        for i, each in enumerate(LESSONS)
+    ],
+)
 def test_no_page_ends_inside_a_sentence(browser: Browser, lesson: type[Lesson]) -> None:
     sheets = [sheet_of(lesson, kin.get_robot(name)) for name in ("pioneer5", "planar2r", "redundant7-craig")]
     for at, found in divided(browser, sheets).items():

@@ -204,6 +204,7 @@ def test_a_target_is_typed_and_dragged_and_the_page_solves(saved: Page) -> None:
     expect(saved.locator("#postures button")).to_have_count(8)
 
 
+@pytest.mark.full
 def test_a_saved_target_with_obstacles_keeps_its_answer(browser: Browser, tmp_path: Path) -> None:
     iiwa, ball = kin.get_robot("iiwa14"), kin.Obstacle("sphere", [0.0, 0.0, 3.0], radius=0.1)
     q = iiwa.clip(iiwa.q_home + 0.4)
@@ -252,7 +253,7 @@ def test_the_arm_is_drawn_and_can_be_turned_with_the_keyboard(saved: Page) -> No
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("width", [320, 390, 768])
+@pytest.mark.parametrize("width", [320, *(pytest.param(width, marks=pytest.mark.slow) for width in (390, 768))])
 def test_a_phone_shows_everything_without_scrolling_sideways(saved: Page, width: int) -> None:
     saved.set_viewport_size({"width": width, "height": 844})
     assert saved.evaluate("document.documentElement.scrollWidth") <= width
