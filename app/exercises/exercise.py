@@ -184,7 +184,7 @@ class Exercise:
             if not needs_arm:
                 q = np.array([value.value(scope) for value in self.q]) if self.q else q
                 scope = Joined(plain, Facts(robot, q))
-        return Variant(name, robot, q, values, self._pose(q, scope))
+        return Variant(name, robot, q, values, self._pose(q, scope), posed=self.q)
 
     def _pose(self, q: Array, scope: Mapping[str, float | Function]) -> Array | None:
         if self.target is None:

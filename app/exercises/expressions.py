@@ -124,7 +124,9 @@ def _value(node: ast.expr, scope: Mapping[str, float | Function]) -> float:
                 raise TypeError(f"{name} needs arguments in brackets")
             return found
         case ast.Call(func=ast.Name(id=name), args=arguments):
-            function = FUNCTIONS[name] if name in FUNCTIONS else scope[name]
+            function = scope.get(name)
+            if not callable(function):
+                function = FUNCTIONS[name] if name in FUNCTIONS else scope[name]
             if not callable(function):
                 raise TypeError(f"{name} is not a function")
             return float(function(*(_value(argument, scope) for argument in arguments)))

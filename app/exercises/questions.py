@@ -12,15 +12,18 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from app.exercises.mistakes import Models
 from app.exercises.typed import read_number, units_like
+from app.exercises.variant import Variant
 from kin import InputError
 from kin.transforms import Array
 from kin.typed import LONGEST
 from kin.units import ANGLES, DEGREES, LENGTH_UNITS, PLAIN, RADIANS, Unit, general
 
+WRITTEN, UNIT, RELATED = "written", "unit", "related"
 Form = Literal["fields", "options", "order", "posture", "postures", "frame", "table", "program"]
 
 
@@ -32,6 +35,9 @@ class Verdict:
         credit: the part of the answer that is right, 0 to 1.
         parts: what was asked in parts: whether each is right, and why.
         way: how to find the answer, if `reason` only says what is wrong with this one.
+        cause: of a wrong number: the mistake by its code in `app.exercises.mistakes`, `WRITTEN` if the file knows
+            it, `UNIT`, or `RELATED` for a relation to the right one; "" if it is not known.
+        mistaken: what the question is about if that mistake is made.
     """
 
     right: bool
@@ -39,6 +45,8 @@ class Verdict:
     credit: float = 0.0
     parts: tuple[tuple[bool, str], ...] = ()
     way: str = ""
+    cause: str = ""
+    mistaken: Variant | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """What is right has full credit."""
@@ -218,6 +226,7 @@ class Number(Question):
         named: a sentence that tells `answer` from the other ways.
         ordered: whether it helps to know that an answer is too large: not if it is the number of a joint.
         whole: whether it is a whole number, such as a count.
+        models: the mistakes that can be made in it.
     """
 
     prompt: str
@@ -231,6 +240,7 @@ class Number(Question):
     named: str = ""
     ordered: bool = True
     whole: bool = False
+    models: Models | None = field(default=None, compare=False, repr=False)
 
     def asked(self) -> Asked:
         return Asked("fields", ("",), (self.unit.name,), self.tolerance_text)
@@ -254,13 +264,17 @@ class Number(Question):
             if self._near(answer, way.value):
                 return Verdict(True, way.reason)
         if slip := self.slip(answer):  # nearer than a mistake may be: the tolerance is that of the right value
-            return Verdict(False, slip, way=self.method)
+            return Verdict(False, slip, way=self.method, cause=UNIT)
         for mistake in self.mistakes:
             if not mistake.beyond and self._near(answer, mistake.value):
-                return Verdict(False, mistake.reason)
+                return Verdict(False, mistake.reason, cause=WRITTEN)
         for mistake in self.mistakes:
             if mistake.beyond and abs(answer) > abs(mistake.value) + self.tolerance:
-                return Verdict(False, mistake.reason, way=self.method)
+                return Verdict(False, mistake.reason, way=self.method, cause=WRITTEN)
+        if relation := self._relation(answer):
+            return Verdict(False, relation, way=self.method, cause=RELATED)
+        if self.models is not None and (model := self.models.named([answer])) is not None:
+            return Verdict(False, model.said, way=self.method, cause=model.code, mistaken=model.variant)
         return Verdict(False, self._what_is_wrong(answer), way=self.method)
 
     def right(self) -> float:
@@ -285,7 +299,7 @@ class Number(Question):
         """The right value, in decimals that the tolerance leaves meaningful."""
         if self.whole:
             return f"{self.answer:.0f}"
-        return self.unit.text(self.answer, self._decimals - self.unit.finer).rstrip()
+        return self.unit.text(self.answer, self.decimals - self.unit.finer).rstrip()
 
     @property
     def tolerance_text(self) -> str:
@@ -297,16 +311,17 @@ class Number(Question):
 
     def _what_is_wrong(self, answer: float) -> str:
         """What is wrong with an answer that is no known mistake."""
-        if (self.whole or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE):
+        if self._is_no_count(answer):
             return "The answer is a whole number, and not negative."
-        if relation := self._relation(answer):
-            return relation
         if self.whole_turns or not self.ordered:
             return ""
         size = "large" if abs(answer) > abs(self.answer) else "small"
         if answer * self.answer < 0.0:
             return f"The sign is not right, and the size is too {size}."
         return f"{'The size is too' if min(self.answer, answer) < 0.0 else 'Too'} {size}."
+
+    def _is_no_count(self, answer: float) -> bool:
+        return (self.whole or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE)
 
     def slip(self, answer: float) -> str:
         """What the typed number would be right in: another unit, whatever its sign; "" if in none."""
@@ -322,6 +337,8 @@ class Number(Question):
 
     def _relation(self, answer: float) -> str:
         """How an answer is related to the right value, if it is in a way that mistakes lead to; "" otherwise."""
+        if self._is_no_count(answer):
+            return ""
         if self._near(-answer, self.answer):
             return "The size is right, the sign is not."
         if self.whole or not self.ordered:
@@ -351,7 +368,7 @@ class Number(Question):
         return abs(self.answer) <= 2.0 * self.tolerance
 
     @property
-    def _decimals(self) -> int:
+    def decimals(self) -> int:
         """Of the unit, as the tolerance leaves them meaningful; none of a share of zero."""
         return 0 if self.tolerance == 0.0 else max(0, -math.floor(math.log10(self.tolerance * self.unit.scale)))
 
@@ -360,7 +377,7 @@ class Number(Question):
         if self.whole:
             return f"The value is {self.value_text}."
         shown = self.answer * self.unit.scale
-        exact = math.isclose(shown, round(shown, self._decimals), rel_tol=1e-9, abs_tol=1e-9)
+        exact = math.isclose(shown, round(shown, self.decimals), rel_tol=1e-9, abs_tol=1e-9)
         return f"The exact value is {self.value_text}." if exact else f"Rounded, it is {self.value_text}."
 
     def _near(self, given: float, value: float) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,15 +30,19 @@ class Facts(Mapping[str, "float | Function"]):
     values, the largest first), ``px(i) py(i) pz(i)`` (the origin of frame i; 0: the base), ``theta(i) d(i) a(i)
     alpha(i)`` of a row, ``q(i) low(i) high(i)`` of a joint, and ``postures()``: how many solutions the tool's
     pose has.
+
+    Args:
+        pose: where the tool is taken to be ``(4, 4)``, if a mistaken model says otherwise than the arm.
+        axes: the rotation ``(3, 3)`` whose columns the Jacobian is seen along; those of the base by default.
     """
 
-    def __init__(self, robot: Robot, q: Array) -> None:
-        self._robot, self._q = robot, q
+    def __init__(self, robot: Robot, q: Array, pose: Array | None = None, axes: Array | None = None) -> None:
+        self._robot, self._q, self._given, self._axes = robot, q, pose, axes
         self._made: dict[str, Callable[[], float | Function]] = {
             "n": lambda: float(robot.n),
             "w": lambda: float(kin.manipulability(robot, q)),
             "rank": lambda: float(rank(robot, task_jacobian(robot, q), 1e-6)),
-            "J": lambda: self._entry(kin.jacobian(robot, q)),
+            "J": lambda: self._entry(self._jacobian),
             "sigma": lambda: self._entry(np.linalg.svd(task_jacobian(robot, q), compute_uv=False)),
             "postures": lambda: lambda: self._postures,
             "q": lambda: self._entry(q),
@@ -58,7 +62,12 @@ class Facts(Mapping[str, "float | Function"]):
 
     @cached_property
     def _pose(self) -> Array:
-        return kin.fk(self._robot, self._q)
+        return kin.fk(self._robot, self._q) if self._given is None else self._given
+
+    @cached_property
+    def _jacobian(self) -> Array:
+        J = kin.jacobian(self._robot, self._q)
+        return J if self._axes is None else np.vstack([self._axes.T @ J[:3], self._axes.T @ J[3:]])
 
     @cached_property
     def _postures(self) -> float:
@@ -121,7 +130,10 @@ class Variant:
         robot, q: the arm, and the configuration ``(n,)`` that the exercise is about.
         values: the numbers drawn, by name.
         target: the pose ``(4, 4)`` that the exercise is about, if it gives one.
-        functions, words: what expressions and texts may use besides.
+        functions, words: what expressions and texts may use besides. A function goes before the built-in one of
+            its name.
+        posed: the expressions that `q` was computed from, if a file gives them.
+        facts: what expressions may use about the arm, if it is not what `robot` and `q` say.
     """
 
     name: str
@@ -131,12 +143,26 @@ class Variant:
     target: Array | None = None
     functions: Mapping[str, Function] = field(default_factory=dict)
     words: Mapping[str, str] = field(default_factory=dict)
+    posed: tuple[Expression, ...] = ()
+    facts: Facts | None = None
 
     @cached_property
     def scope(self) -> Mapping[str, float | Function]:
         """What expressions may use."""
         drawn = {name: quantity.value for name, quantity in self.values.items()}
-        return Joined({**drawn, **self.functions}, Facts(self.robot, self.q))
+        return Joined({**drawn, **self.functions}, self.facts or Facts(self.robot, self.q))
+
+    def with_number(self, name: str, value: float) -> Variant:
+        """The same with another value of a number; the configuration follows it, what was computed from it not."""
+        changed = {**self.values, name: replace(self.values.get(name, Quantity(value)), value=value)}
+        numbers = {name: quantity.value for name, quantity in changed.items()}
+        q = np.array([each.value(numbers) for each in self.posed]) if self.posed else self.q
+        return replace(self, values=changed, q=q)
+
+    def arm_unlike(self, other: Variant) -> tuple[Robot, Array] | None:
+        """The arm and its configuration; None if they are those of another variant."""
+        same = self.robot == other.robot and np.array_equal(self.q, other.q)
+        return None if same else (self.robot, self.q)
 
     @cached_property
     def pose(self) -> Array:

@@ -77,17 +77,22 @@ def edits(m: int, reference: Robot, frames_too: bool) -> Iterator[Edit]:
         reference: the arm that the tables are compared with.
         frames_too: whether its base and tool may have been left out.
     """
-    yield Edit("convention", (), (), 0.4, _other_convention)
-    yield from _units()
-    yield from _signs(m)
-    yield from _angles(m)
-    yield from _exchanges(m)
+    yield from edits_by_themselves(m)
     yield from _shifts(m, reference)
     yield from _numbers(m)
     if frames_too:
         base, tool = reference.T_world_base, reference.T_last_tool
         yield Edit("base", (), (), 1.0, lambda t: replace(t, base=np.broadcast_to(base, t.base.shape)))
         yield Edit("tool", (), (), 1.0, lambda t: replace(t, tool=np.broadcast_to(tool, t.tool.shape)))
+
+
+def edits_by_themselves(m: int) -> Iterator[Edit]:
+    """Those of them that need no reference."""
+    yield Edit("convention", (), (), 0.4, _other_convention)
+    yield from _units()
+    yield from _signs(m)
+    yield from _angles(m)
+    yield from _exchanges(m)
 
 
 @lru_cache(maxsize=16)

@@ -61,7 +61,7 @@ def test_exercises_by_keyboard_and_mouse(tab: Tab) -> None:
     expect(block(tab, "foot")).to_contain_text("Hint 1.")
     expect(field).to_have_value(str(d + a))
     page.locator("[data-exercises=question] [data-guide-do=fields]").click()
-    expect(block(tab, "foot")).to_contain_text("the way round the corner")
+    expect(block(tab, "foot")).to_contain_text("You get this with the sides added.")
     field.fill(str((d * d + a * a) ** 0.5))
     field.press("Enter")
     expect(page.locator("[data-exercises-verdict]")).to_contain_text("Right")

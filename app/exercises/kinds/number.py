@@ -12,7 +12,19 @@ from app.exercises.cell import ONLY_WHERE, TO_WHOM, Declared
 from app.exercises.contract import PLAIN_UNITS, Kind, typed
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
-from app.exercises.questions import WHOLE, Asked, Mistake, Number, Question, Verdict, apart, share, texts
+from app.exercises.mistakes import ROWS, Case, Models
+from app.exercises.questions import (
+    RELATED,
+    WHOLE,
+    Asked,
+    Mistake,
+    Number,
+    Question,
+    Verdict,
+    apart,
+    share,
+    texts,
+)
 from app.exercises.variant import Variant
 from kin.units import METRES, PLAIN, Unit, Units, general
 
@@ -84,6 +96,9 @@ class NumberKind(Kind):
         "mistake",
         {"value": "0", "reason": "Why this is wrong."},
     )
+    without: tuple[str, ...] = cell.lines(
+        "Mistakes not to name", f"Of those that the page recognises, one in each line: {', '.join(ROWS)}."
+    )
 
     def check(self, table: Fields) -> None:
         count = len(self.value)
@@ -93,6 +108,9 @@ class NumberKind(Kind):
             if len(each.value) != count:
                 valid = f"as many values as the answer has: {count}"
                 raise table.refuse(f"mistakes[{i}].value", len(each.value), valid)
+        for i, code in enumerate(self.without):
+            if code not in ROWS:
+                raise table.refuse(f"without[{i}]", code, "one of " + ", ".join(f'"{each}"' for each in ROWS))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +127,8 @@ class NumberKind(Kind):
             return units.angles.per_second()
         return Unit(self.unit, 1.0, OTHER[self.unit]) if self.unit in OTHER else PLAIN
 
-    def _questions(self, variant: Variant, units: Units) -> list[Number]:
+    def questions(self, variant: Variant, units: Units) -> list[Number]:
+        """Each number that is asked."""
         unit, method = self._shown_unit(units), variant.text(self.method, units)
         wrong = [
             (variant.vector(each.value), variant.text(each.reason, units), each.beyond)
@@ -134,24 +153,36 @@ class NumberKind(Kind):
             if self.least is not None:
                 question = apart(question, variant.number(self.least) * SCALES.get(self.unit, 1.0))
             found.append(question)
+        if len(found) == 1 and self._explained:
+            return [replace(found[0], models=self.models(variant, units, found))]
         return found
 
+    @property
+    def _explained(self) -> bool:
+        """Whether mistakes are looked for: a count agrees with many by chance, and takes long to compute."""
+        return self.unit not in COUNTED and not any("postures" in each.names for each in self.value)
+
+    def models(self, variant: Variant, units: Units, questions: list[Number]) -> Models:
+        """The mistakes that can be made in these numbers."""
+        tolerances = tuple(question.tolerance for question in questions)
+        return Models(Case(variant, self.value, units), tolerances, self.whole_turns, frozenset(self.without))
+
     def ask(self, prompt: str, variant: Variant, units: Units) -> Question:
-        questions = self._questions(variant, units)
+        questions = self.questions(variant, units)
         return replace(questions[0], prompt=prompt) if len(questions) == 1 else super().ask(prompt, variant, units)
 
     def asked(self, variant: Variant, units: Units) -> Asked:
-        questions = self._questions(variant, units)
+        questions = self.questions(variant, units)
         return Asked("fields", self.names, (questions[0].unit.name,) * len(questions), questions[0].tolerance_text)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         verdict = self.in_stages(variant, given, units)
         if verdict.way and verdict.parts:
-            return Verdict.of(verdict.parts)
+            return replace(Verdict.of(verdict.parts), cause=verdict.cause)
         return replace(verdict, reason=verdict.full, way="")
 
     def in_stages(self, variant: Variant, given: object, units: Units) -> Verdict:
-        questions = self._questions(variant, units)
+        questions = self.questions(variant, units)
         typed_texts = texts(given, len(questions), "the numbers in the order asked")
         values = [question.read_text(text) for question, text in zip(questions, typed_texts, strict=True)]
         found = [question.judge(value) for question, value in zip(questions, values, strict=True)]
@@ -162,21 +193,25 @@ class NumberKind(Kind):
         if verdict.right:
             return verdict
         if swap := _swapped(questions, values, self.names):
-            return replace(verdict, reason=swap)
+            return replace(verdict, reason=swap, cause=RELATED)
         label, wrong = next(pair for pair in zip(self.names, found, strict=True) if not pair[1].right)
-        return replace(verdict, reason=f"{label}: {wrong.reason or 'This is not right.'}", way=wrong.way)
+        unexplained = self._explained and any(not one.right and not one.cause for one in found)
+        if unexplained and (model := self.models(variant, units, questions).named(values)) is not None:
+            return replace(verdict, reason=model.said, cause=model.code, mistaken=model.variant)
+        reason = f"{label}: {wrong.reason or 'This is not right.'}"
+        return replace(verdict, reason=reason, way=wrong.way, cause=wrong.cause)
 
     def answer(self, variant: Variant) -> object:
         return [typed(variant.number(value), self._shown_unit(Units())) for value in self.value]
 
     def verify(self, variant: Variant) -> None:
         super().verify(variant)
-        for question in self._questions(variant, PLAIN_UNITS):
+        for question in self.questions(variant, PLAIN_UNITS):
             if question.whole and abs(question.answer - round(question.answer)) > 1e-6:
                 raise ValueError(f"the value is {general(question.answer)}: a {self.unit} is a whole number")
 
     def solution(self, variant: Variant, units: Units) -> str:
-        questions = self._questions(variant, units)
+        questions = self.questions(variant, units)
         shown = ", ".join(
             f"{label} = {question.value_text}" if label else question.value_text
             for label, question in zip(self.names, questions, strict=True)
