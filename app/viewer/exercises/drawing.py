@@ -1,4 +1,5 @@
-"""Frames of an exercise in the scene: its target, the ghost that the student places, and the right place."""
+"""An exercise in the scene: frames of its target, of the ghost that the student places and of the right place, and
+the arm that a wrong answer is about."""
 
 from __future__ import annotations
 
@@ -9,14 +10,17 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.viewer.declared.scene import SceneView, label
 from app.viewer.panel import Post
-from kin import wxyz_from_rotation
+from app.viewer.skeleton import ghost
+from kin import Robot, fk, wxyz_from_rotation
 from kin.transforms import Array
 
 GHOST: Hashable = "ghost"
 SIZE = 0.14  # of a frame's axes, in reaches of the arm
 _NUMBERS = count(1)
 _COLOR = (213, 94, 0)
+OPACITY = 0.42  # of a copy of the arm
 
 
 class Drawing:
@@ -26,9 +30,11 @@ class Drawing:
         self._scene, self._post = scene, post
         self._nodes: list[Any] = []
         self._ghost: viser.TransformControlsHandle | None = None
+        self._arm = SceneView(scene, "exercise-arm", post)
 
     def clear(self) -> None:
         """Remove everything."""
+        self.arm(None)
         for node in reversed(self._nodes):
             node.remove()
         self._nodes.clear()
@@ -82,6 +88,14 @@ class Drawing:
         async def _(event: viser.TransformControlsEvent) -> None:
             if event.client is not None:
                 self._post(GHOST, (event.target.position.tolist(), event.target.wxyz.tolist()))
+
+    def arm(self, at: tuple[Robot, Array] | None) -> None:
+        """A copy of an arm at q ``(n,)``, for which a wrong answer is right; None removes it."""
+        if at is None:
+            self._arm.remove()
+            return
+        words = label("words", "the arm of your answer", fk(*at)[:3, 3], anchor=None)
+        self._arm.show((ghost("arm", *at, _COLOR, OPACITY), words))
 
     def place(self, T: Array) -> None:
         """Move the ghost."""

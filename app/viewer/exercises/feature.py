@@ -272,6 +272,8 @@ class Practising(Feature):
             sheet.error = f"{str(error)[:1].upper()}{str(error)[1:]}."
             return
         sheet.verdict = verdict
+        shown, mistaken = self.stage.now.robot == exercise.robot, verdict.mistaken
+        self._drawing.arm(mistaken.arm_unlike(variant) if shown and mistaken is not None else None)
         seconds, self._since = time.perf_counter() - self._since, time.perf_counter()
         self._take(exercise, given, verdict, seconds, sending)
         if verdict.right:

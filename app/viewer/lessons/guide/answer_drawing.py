@@ -10,7 +10,7 @@ import numpy as np
 from app.exercises.contract import Posed
 from app.exercises.questions import Choice, Number, Question
 from app.viewer.declared.scene import Color, Node, axes, bars, label
-from app.viewer.exercises.drawing import SIZE
+from app.viewer.exercises.drawing import OPACITY, SIZE
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
 from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, SemiAxis, Step, Triad
 from app.viewer.scene.meshes import body
@@ -19,7 +19,6 @@ from kin import Robot, fk, link_frames
 from kin.transforms import Array, pose_from_position_wxyz
 
 YOURS = "your answer"
-OPACITY = 0.42  # of a copy of the arm
 THICK, DASHES = 0.6, 9  # of a bar, in the arm's thickness; parts of a broken one
 FARTHEST = 1.2  # reaches of the arm that a wrong bar is long at most; its label has the value
 CUT = "drawn shorter"  # the label of a bar that would be longer

@@ -159,6 +159,27 @@ def test_a_student_solves_exercises_and_the_page_keeps_it(server: int) -> None:
         tab.wait(lambda: f"1 of {len(ALL.all)} solved" in shown(tab))
 
 
+def test_the_arm_of_a_mistaken_answer_is_drawn_until_the_next_answer(server: int) -> None:
+    one = exercise("planar-tool-point")
+    variant = variant_of(one)
+    mistaken = variant.with_number("t2", -variant.values["t2"].value)
+    tool = kin.fk(mistaken.robot, mistaken.q)[:3, 3]
+
+    def drawn(tab: FakeBrowser) -> list[str]:
+        return [name for name, node in tab.nodes.items() if node["props"].get("text") == "the arm of your answer"]
+
+    with FakeBrowser(server, memory=begun()) as tab:
+        tab.settle()
+        press(tab, ["open", one.id, 1])
+        tab.wait(lambda: variant.text(one.text, UNITS) in shown(tab))
+        assert not drawn(tab)
+        press(tab, ["fields", 2], [[f"{1000 * x:.1f}" for x in tool[:2]]])
+        tab.wait(lambda: f"with the other sign of {variant.values['t2'].text(UNITS)}." in shown(tab))
+        tab.wait(lambda: [np.allclose(tab.local(name)[:3, 3], tool, atol=1e-6) for name in drawn(tab)] == [True])
+        press(tab, ["fields", 3], [["1", "1"]])
+        tab.wait(lambda: not drawn(tab))
+
+
 def test_the_arm_is_the_answer_where_a_posture_is_asked(server: int) -> None:
     one = exercise("reach-elbow")
     variant = variant_of(one)
