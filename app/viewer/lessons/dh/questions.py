@@ -18,10 +18,9 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import DOWN, UP, direction, level, line
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance, moved
-from kin import Robot, compare, fk, link_frames
+from kin import Robot, compare, fk
 from kin.axes import joint_axes, pairs
 from kin.comparison import Comparison, messages
-from kin.transforms import Array
 from kin.units import Units
 
 TURN = math.radians(30.0)
@@ -50,15 +49,14 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     a, d = (value(robot, row, factor, robot.q_home) for factor in ("a", "d"))
     pair = next((pair.joint + 1 for pair in pairs(robot) if not pair.parallel), 1)
     end = max(n - 1, 1)
-    numbers = {
+    numbers: dict[str, float | Quantity] = {
         "rows": len(robot.rows),
         "n": n,
         "standard": robot.convention == "standard",
         "row": row + 1,
         "before": row,
-        "distance": origin_distance(robot, row, robot.q_home),
-        "a": abs(a),
-        "d": abs(d),
+        "a": Quantity(abs(a), "length"),
+        "d": Quantity(abs(d), "length"),
         "pair": pair,
         "pair_next": pair + 1,
         "end": end,
@@ -89,7 +87,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         ),
     }
     poses = {"home": Pose(as_configuration(robot.q_home)), "moved": Pose(as_configuration(q))}
-    values = {name: float(number) for name, number in numbers.items()}
+    values = {name: x if isinstance(x, Quantity) else float(x) for name, x in numbers.items()}
     return LessonFacts({**values, **ROW}, functions, words, poses, leads=leads(robot, pair))
 
 
@@ -139,12 +137,6 @@ def _telling_row(robot: Robot) -> int:
     both = [i for i, row in enumerate(robot.rows) if row.a and row.d]
     lengths = [math.hypot(row.a, row.d) for row in robot.rows]
     return both[0] if both else int(np.argmax(lengths))
-
-
-def origin_distance(robot: Robot, row: int, q: Array) -> float:
-    """Between the origins of the frames before and after a row, by forward kinematics."""
-    frames = np.concatenate([robot.T_world_base[None], link_frames(robot, q)])
-    return distance(frames[row], frames[row + 1])
 
 
 def relation(robot: Robot, joint: int) -> str:
@@ -215,18 +207,18 @@ def _wrong_sign(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str,
     return numbers, {"wrong": f"{symbol(robot, row, factor)} = {was}", "verdict": verdict}
 
 
-def _offset(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str, str]]:
+def _offset(robot: Robot, units: Units) -> tuple[dict[str, float | Quantity], dict[str, str]]:
     """A joint and the number of its row that it changes, at home."""
     k = _offset_joint(robot)
     row, q = robot.joint_rows[k], float(robot.q_home[k])
     factor = MOVED[robot.rows[row].kind]
-    numbers = {
+    measure = "angle" if turns(factor) else "length"
+    numbers: dict[str, float | Quantity] = {
         "joint": k + 1.0,
         "joint_row": row + 1.0,
         "joint_turns": float(turns(factor)),
-        "offset": float(getattr(robot.rows[row], factor)),
-        "alone": q,
-        "total": value(robot, row, factor, robot.q_home),
+        "offset": Quantity(float(getattr(robot.rows[row], factor)), measure),
+        "alone": Quantity(q, measure),
     }
     return numbers, {"joint_at": amount(factor, q, units), "expression": expression(robot, row, factor, units)}
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.outline import Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from kin import Robot
@@ -35,7 +36,7 @@ def other_elbow(robot: Robot) -> Array:
     return q
 
 
-def facts(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str, str]]:
+def facts(robot: Robot, units: Units) -> tuple[dict[str, float | Quantity], dict[str, str]]:
     """The numbers and the words of the steps by hand, for the point that the second link has at home.
 
     For an arm that is not planar they mean nothing, and no text uses them.
@@ -44,17 +45,15 @@ def facts(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str, str]]
     q = robot.q_home if is_planar(robot) else np.zeros(2)
     x, y = l1 * math.cos(q[0]) + l2 * math.cos(q[0] + q[1]), l1 * math.sin(q[0]) + l2 * math.sin(q[0] + q[1])
     length = units.lengths
-    numbers = {
+    numbers: dict[str, float | Quantity] = {
         "planar": float(is_planar(robot)),
-        "l1": l1,
-        "l2": l2,
-        "bend": abs(float(q[1])),
+        "l1": Quantity(l1, "length"),
+        "l2": Quantity(l2, "length"),
+        "far": Quantity(math.hypot(x, y), "length"),
         "theta1": float(q[0]),
         "other_theta1": float(other_elbow(robot)[0]) if is_planar(robot) else 0.0,
     }
     return numbers, {
-        "l1_shown": length.text(l1),
-        "l2_shown": length.text(l2),
         "ring_inside": length.text(abs(l1 - l2)),
         "ring_outside": length.text(l1 + l2),
         "theta2_sign": "positive" if q[1] > 0.0 else "negative",

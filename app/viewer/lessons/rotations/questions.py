@@ -19,7 +19,7 @@ from app.viewer.scene.chain import rotation
 from app.viewer.scene.meshes import body
 from kin import Robot, fk
 from kin.axes import inverse
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array
 from kin.units import Units, fixed
 
 _SAMPLES, LEVEL = 64, 0.1  # configurations; the vertical part of a direction that is nearly level
@@ -53,28 +53,25 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     k = int(np.argmax(np.abs(back)))
     row, column = _first_entry(R, k, {(i, j), (j, i), (2, 0), (2, 2)})
     between = math.acos(max(-1.0, min(1.0, float(R[row, column]))))
-    numbers = {
+    numbers: dict[str, float | Quantity] = {
         "upright": np.sort(np.abs(R[:, 2]))[1] < 1e-6,
         "row": row + 1,
         "at": column + 1,
-        "entry": R[row, column],
         "exchanged": R[column, row],
-        "between": between,
+        "between": Quantity(between, "angle"),
         "i": i + 1,
         "j": j + 1,
         "rij": R[i, j],
         "rji": R[j, i],
-        "r31": R[2, 0],
-        "pitch": PAGE.angles(R)[1],
-        "r33": R[2, 2],
-        "beta": ZYZ.angles(R)[1],
-        "theta": theta,
-        "trace": np.trace(R),
-        "w": wxyz_from_rotation(R)[0],
+        "r31": np.clip(R[2, 0], -1.0, 1.0),
+        "r33": np.clip(R[2, 2], -1.0, 1.0),
+        "theta": Quantity(theta, "angle"),
+        "trace": np.clip(np.trace(R), -1.0, 3.0),
         "k": k + 1,
         "origin": back[k],
         "same_p": p[k],
         "by_row": R[k] @ p,
+        "far": Quantity(slide_of(robot), "length"),
     }
     words = {
         "fixed_axis": "xyz"[row],
@@ -95,9 +92,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "p": "(" + ", ".join(units.lengths.number(v) for v in p.tolist()) + f"){units.lengths.suffix}",
     }
     poses = _poses(robot, start, R)
-    values: dict[str, float | Quantity] = {name: float(value) for name, value in numbers.items()}
-    found = {**values, "far": Quantity(slide_of(robot), "length")}
-    return LessonFacts(found, {}, words, poses, leads=leads(robot, T))
+    values = {name: x if isinstance(x, Quantity) else float(x) for name, x in numbers.items()}
+    return LessonFacts(values, {}, words, poses, leads=leads(robot, T))
 
 
 def _first_entry(R: Array, k: int, given: set[tuple[int, int]]) -> tuple[int, int]:

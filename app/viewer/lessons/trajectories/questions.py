@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from markupsafe import Markup
 
+from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Lead, Outline, Path, Pose
 from app.viewer.lessons.guide.poses import as_configuration
@@ -50,10 +51,10 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     swings = residual(found["trapezoidal"], hertz) / max(residual(found["S-curve"], hertz), 1e-12)
     sketch = sketched(robot)
     long, (v, a, _) = LONG * sketch.way, joint.limits.tolist()
-    numbers = {
+    numbers: dict[str, float | Quantity] = {
         "both": float(between is not None),
         "speed": SPEED,
-        "closest": OFFSETS[0],
+        "closest": Quantity(OFFSETS[0], "length"),
         "swings": swings,
         "turns": float(robot.revolute[0]),
         "sketched": sketch.way,
