@@ -14,7 +14,7 @@ import numpy as np
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Node as SceneNode
-from app.viewer.declared.work import Sweep, Work
+from app.viewer.declared.work import Sweep
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.velocity import section_views, views
 from app.viewer.lessons.velocity.drawing import force_scale, lost_ends, scene, truncated
@@ -158,17 +158,20 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     def on_line_plot(self) -> None:
         self.change(plot=section_views.plot_html(self.stage.now, self.settings.start, self.stage.units))
 
-    def running(self) -> Sequence[Work | Sweep]:
-        found: list[Work | Sweep] = [Sweep(self._move, FRAME)] if self.settings.runs else []
-        lost = np.zeros((0, 3)) if self.hides("singularities") else lost_ends(self.read)
-        return [*found, Work("in view", self._keep_in_view, (lost.round(6),), keep=True)]
-
-    def _keep_in_view(self, ends: Array) -> Array:
-        """Let the picture contain the arrows of lost directions, and the arm alone when they are gone."""
-        before = self.facts.work("in view").value
-        if len(ends) or (before is not None and len(before)):
+    def refresh(self) -> None:
+        """Show what is declared; the picture contains the arrows of lost directions, or else the arm alone."""
+        before = self._lost_ends() if self.shown_at else np.zeros((0, 3))
+        super().refresh()
+        ends = self._lost_ends()
+        if not np.array_equal(ends, before):
             self.stage.keep_in_view(None, ends)
-        return ends
+
+    def _lost_ends(self) -> Array:
+        """Where the arrows of lost directions end that are drawn ``(n, 3)``."""
+        return np.zeros((0, 3)) if "singularities" in self._withheld else lost_ends(self.read).round(6)
+
+    def running(self) -> Sequence[Sweep]:
+        return [Sweep(self._move, FRAME)] if self.settings.runs else []
 
     def _move(self, seconds: float) -> None:
         """A frame of the motion in the null space; another motion of the arm ends it."""
