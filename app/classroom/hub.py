@@ -193,6 +193,7 @@ class Hub:
                 thread.start()
         if not live.knows(ticket.seat):
             self._try(live, lambda: self._look(live))
+            live.look_who_is_there()  # who leaves again before the next tick has come, too
         return Attendance(self.rooms, live, place)
 
     def close(self) -> None:

@@ -285,7 +285,11 @@ class LiveRoom:
 
     def _seat(self, row: Mapping[str, Any]) -> SeatView:
         names = ("id", "alias", "hand", "task", "gone", "driven", "work", "page")
-        return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away, seen=row["beat"] > 0)
+        return SeatView(
+            **{name: row[name] for name in names},
+            away=row["id"] in self.away,
+            came=came(row["beat"], row["tries"]),
+        )
 
     def _is_shown(self, seat: str) -> bool:
         """Whether the teacher shows the arm of this seat to all."""
@@ -315,6 +319,11 @@ class LiveRoom:
 def _there(row: Mapping[str, Any]) -> bool:
     """Whether a seat is there: not removed by the teacher."""
     return not row["removed"]
+
+
+def came(beat: int, tries: int) -> bool:
+    """Whether a page of a seat was ever connected, or an answer of it is stored; of its columns."""
+    return beat > 0 or tries > 0
 
 
 def with_own(kept: Mapping[str, list[str]], own: Mapping[str, str]) -> dict[str, list[str]]:

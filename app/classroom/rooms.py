@@ -21,7 +21,7 @@ from sqlalchemy import Connection, Text, cast, delete, func, insert, select, upd
 from app.classroom import erasure, marks
 from app.classroom.clock import now
 from app.classroom.database import PATIENCE, WAIT, Database
-from app.classroom.live import LiveRoom
+from app.classroom.live import LiveRoom, came
 from app.classroom.store import read, store_reports
 from app.classroom.tables import TOKEN_BYTES, LtiSeat, Room, Seat
 from app.classroom.tables import Attempt as Stored
@@ -69,6 +69,8 @@ class OpenRoom:
 
     Attributes:
         token: the signed token of the teacher's link.
+        students: how many have come.
+        awaited: how many have joined and are not here yet.
         alias: of the seat of the ticket; empty for the teacher.
     """
 
@@ -79,6 +81,7 @@ class OpenRoom:
     ends: float
     token: str
     students: int = 0
+    awaited: int = 0
     alias: str = ""
 
 
@@ -89,19 +92,15 @@ class Swept:
     Attributes:
         count: how many were removed.
         new: aliases of those who stay because they have joined within the last minute.
-        answered: aliases of those who stay because answers of theirs are stored.
     """
 
     count: int
     new: tuple[str, ...] = ()
-    answered: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
         """Who stays and why; empty: nobody does."""
-        new, answered = (", ".join(names) for names in (self.new, self.answered))
-        said = f"{new}: joined less than a minute ago; press again later." if new else ""
-        return " ".join(filter(None, (said, f"{answered}: answers are stored." if answered else "")))
+        return f"{', '.join(self.new)}: joined less than a minute ago; press again later." if self.new else ""
 
 
 class Change:
@@ -280,13 +279,15 @@ class Rooms:
             room = connection.execute(select(Room).where(Room.id == ticket.room, Room.ends > now())).one_or_none()
             if room is None:
                 return None
-            seats = select(Seat.id, Seat.alias).where(Seat.room_id == room.id, Seat.removed.is_(False))
-            aliases = {seat.id: seat.alias for seat in connection.execute(seats)}
+            query = select(Seat.id, Seat.alias, Seat.beat, Seat.tries)
+            seats = connection.execute(query.where(Seat.room_id == room.id, Seat.removed.is_(False))).all()
+        aliases = {seat.id: seat.alias for seat in seats}
         if ticket.seat and ticket.seat not in aliases:
             return None
         token = "" if ticket.seat else self.tokens.sign(ticket)
         shown = room.id, room.code, room.title, room.created, room.ends, token
-        return OpenRoom(*shown, len(aliases), aliases.get(ticket.seat, ""))
+        students = sum(came(seat.beat, seat.tries) for seat in seats)
+        return OpenRoom(*shown, students, len(seats) - students, aliases.get(ticket.seat, ""))
 
     def is_open(self, ticket: Ticket) -> bool:
         """Whether the room of a ticket goes on, and its seat was not removed."""
@@ -344,13 +345,9 @@ class Rooms:
             seats = change.live.present
             unseen = _unseen(seats)
             change.remove(unseen)
-            stay = [seat for seat in seats if not seat["beat"] and seat["id"] not in unseen]
+            stay = [seat["alias"] for seat in seats if not _came(seat) and seat["id"] not in unseen]
         self.erase()
-        return Swept(
-            len(unseen),
-            new=tuple(seat["alias"] for seat in stay if not seat["tries"]),
-            answered=tuple(seat["alias"] for seat in stay if seat["tries"]),
-        )
+        return Swept(len(unseen), tuple(stay))
 
     def rename_seat(self, room: str, seat: str, alias: str) -> str:
         """Give a seat another alias; returns it, numbered if another student has it. Raises `RefusedError`."""
@@ -417,7 +414,11 @@ def clean_name(text: str, longest: int, field: str) -> str:
 def _unseen(seats: Iterable[Mapping[str, Any]]) -> list[str]:
     """Seats whose page has never come, and that are old enough to be given to somebody else."""
     old = now() - UNSEEN
-    return [one["id"] for one in seats if not one["beat"] and not one["tries"] and one["joined"] < old]
+    return [one["id"] for one in seats if not _came(one) and one["joined"] < old]
+
+
+def _came(seat: Mapping[str, Any]) -> bool:
+    return came(seat["beat"], seat["tries"])
 
 
 def _free_alias(seats: Iterable[Mapping[str, Any]], alias: str, seat: str) -> str:

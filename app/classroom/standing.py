@@ -11,7 +11,7 @@ from typing import Literal
 from app.classroom.views import RoomView, SeatView
 from app.classroom.work import NOTHING, URGENCY, Progress, Work
 
-Presence = Literal["following", "by themselves", "away", "has not come"]
+Presence = Literal["following", "by themselves", "away", "not here yet"]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Standing:
     @property
     def came(self) -> bool:
         """Whether one ever was."""
-        return self.presence != "has not come"
+        return self.presence != "not here yet"
 
     @property
     def rank(self) -> tuple[bool, bool, bool, bool, int]:
@@ -54,7 +54,7 @@ class Standing:
 def standing(seat: SeatView, room: RoomView) -> Standing:
     """How a student of a room is doing."""
     if seat.away:
-        presence: Presence = "away" if seat.seen else "has not come"
+        presence: Presence = "away" if seat.came else "not here yet"
     else:
         led = room.follow or (room.shown is not None and room.shown.seat != seat.id)
         presence = "following" if led and not seat.gone else "by themselves"

@@ -68,7 +68,7 @@ class SeatView:
         work: what was answered, by exercise.
         page: the packed state of the page (`app.viewer.session.state`), or empty.
         away: whether no page of this seat is connected.
-        seen: whether one ever was.
+        came: whether one ever was, or an answer of it is stored.
     """
 
     id: str
@@ -80,7 +80,7 @@ class SeatView:
     work: Mapping[str, Work] = field(default_factory=dict)
     page: str = ""
     away: bool = False
-    seen: bool = True
+    came: bool = True
 
 
 @dataclass(frozen=True)

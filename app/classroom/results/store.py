@@ -9,6 +9,7 @@ from itertools import chain
 from sqlalchemy import Text, cast, func, literal, select, tuple_
 
 from app.classroom.database import Database
+from app.classroom.live import came
 from app.classroom.results.table import Member
 from app.classroom.tables import Attempt as Stored
 from app.classroom.tables import Room, Seat
@@ -29,7 +30,7 @@ def members_of(database: Database, room: str) -> list[Member]:
     with database.read() as connection:
         seats = connection.execute(query.order_by(Seat.joined, Seat.id)).all()
     return [
-        Member(seat.id, seat.alias, number, seat.beat > 0 or seat.tries > 0)
+        Member(seat.id, seat.alias, number, came(seat.beat, seat.tries))
         for number, seat in enumerate(seats, 1)
         if not seat.removed
     ]

@@ -61,7 +61,7 @@ class Row:
     def state(self) -> str:
         """In words, as in the list of students."""
         if not self.member.came:
-            return "has not come"
+            return "not here yet"
         return self.work.progress if self.exercise else "no answer"
 
 

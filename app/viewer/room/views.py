@@ -301,7 +301,7 @@ class Class:
         if room.follow or room.shown is not None:
             facts += [(("▶", "following", "green"), self.being("following"))]
             facts += [(("", "by themselves", ""), self.being("by themselves"))]
-        facts += [((AWAY, "away", ""), self.being("away")), (("", "never came", ""), self.being("has not come"))]
+        facts += [((AWAY, "away", ""), self.being("away")), (("", "not here yet", ""), self.being("not here yet"))]
         return [fact for fact in facts if fact[1]]
 
 

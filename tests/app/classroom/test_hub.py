@@ -420,7 +420,7 @@ def test_a_class_that_joins_at_once_waits_for_its_turn(hub, other, monkeypatch):
     with ThreadPoolExecutor(60) as pool:
         joined = list(pool.map(lambda k: (hub, other)[k % 2].rooms.join(room.code, f"Student {k}"), range(60)))
     assert len({ticket.seat for ticket in joined}) == 60
-    assert hub.rooms.find(joined[0]).students == 60
+    assert hub.rooms.find(joined[0]).awaited == 60
 
 
 def test_who_does_not_get_a_turn_reads_so(hub, monkeypatch):
@@ -659,11 +659,22 @@ def test_seats_that_nobody_takes_keep_no_student_out(hub, monkeypatch):
     assert [hub.rooms.is_open(seat) for seat in (ada, eve, *ghosts, bob)] == [True, True, False, False, True]
     monkeypatch.setattr("app.classroom.rooms.UNSEEN", 60.0)
     swept = hub.rooms.remove_unseen(room.id)
-    assert swept.words == "Bob: joined less than a minute ago; press again later. Eve: answers are stored."
+    assert swept.words == "Bob: joined less than a minute ago; press again later."
     monkeypatch.setattr("app.classroom.rooms.UNSEEN", 0.0)
     swept = hub.rooms.remove_unseen(room.id)
-    assert (swept.count, swept.words) == (1, "Eve: answers are stored.")
+    assert (swept.count, swept.words) == (1, "")
     assert [hub.rooms.is_open(seat) for seat in (ada, eve, bob)] == [True, True, False]
+
+
+def test_who_leaves_before_anybody_has_looked_has_come(hub, other):
+    room = hub.rooms.open("Kinematics", 3600)
+    ada = other.rooms.join(room.code, "Ada")
+    hub.attend(ada, nothing).leave()
+    teacher = hub.attend(Ticket(room.id), nothing)
+    assert [seat.came for seat in teacher.room.seats] == [True]
+    until(lambda: beats(hub, ada) > 0)
+    assert (hub.rooms.find(ada).students, hub.rooms.find(ada).awaited) == (1, 0)
+    teacher.leave()
 
 
 def beats(hub, ticket):

@@ -216,10 +216,10 @@ def test_after_a_start_pages_have_time_to_connect_again(clock):
 
 def test_a_seat_is_seen_once_a_page_has_come(room):
     room.live.load({**ROOM, "state": {}}, Class.seats(beat=0))
-    assert not any(seat.seen for seat in room.teacher.room.seats)
+    assert not any(seat.came for seat in room.teacher.room.seats)
     room.cid.leave()
     room.live.look_who_is_there()
-    assert [seat.seen for seat in room.teacher.room.seats] == [True, True, False]
+    assert [seat.came for seat in room.teacher.room.seats] == [True, True, False]
     assert [row["beat"] for row in room.live.reports()[2]] == [1, 1]
 
 

@@ -121,7 +121,7 @@ def test_sixty_join_in_five_seconds_and_stay_when_the_service_is_killed(tmp_path
             times = sorted(seconds for seconds, _ in joined)
             print(f"joined: p50 {times[30] * 1000:.0f} ms, p95 {times[57] * 1000:.0f} ms")
             assert len({cookies[COOKIE] for _, cookies in joined}) == 60
-            assert "60 students" in teacher.get("/room").text
+            assert "60 not here yet" in teacher.get("/room").text
     with service(tmp_path) as port:
         for _, cookies in joined:
             code_, text = status(port, "/room", cookies)

@@ -144,7 +144,7 @@ def test_who_needs_the_teacher_comes_first_and_everybody_has_a_row() -> None:
         ("busy", "a", "at it"),
         ("late", "a", "solved"),
         ("fast", "a", "solved"),
-        ("ghost", "a", "has not come"),
+        ("ghost", "a", "not here yet"),
     ]
     assert [row.work.tries for row in table] == [3, 0, 0, 1, 1, 2, 1, 0]
     assert (table[0].seconds, table[-2].seconds, table[2].seconds) == (300.0, 10.0, 0.0)

@@ -85,7 +85,7 @@ def test_a_class_joins_by_code_and_ends(make, tmp_path):
     page = student.get("/room").text
     assert "You are in this room as a student" in page
     assert "teach/" not in page
-    assert "1 student so far" in teacher.get("/room").text
+    assert "0 students so far, 1 not here yet." in teacher.get("/room").text
     assert teacher.get("/room/qr.svg").headers["content-type"] == "image/svg+xml"
     assert student.post("/room/end").status_code == 403
     assert "has ended" in teacher.post("/room/end").text
@@ -182,7 +182,7 @@ def test_joining_again_keeps_the_seat(make):
     join(student, code, "Ada L.")
     assert student.cookies[COOKIE] == first
     join(make(), code, "Ada")
-    assert "2 students" in teacher.get("/room").text
+    assert "0 students so far, 2 not here yet." in teacher.get("/room").text
 
 
 def test_who_gets_a_number_to_the_alias_reads_so_and_the_rule_stands_before_the_error(make):

@@ -107,11 +107,11 @@ class Truth:
 
     @property
     def came(self) -> bool:
-        return self.presence != "has not come"
+        return self.presence != "not here yet"
 
     @property
     def here(self) -> bool:
-        return self.presence not in ("away", "has not come")
+        return self.presence not in ("away", "not here yet")
 
     @property
     def rank(self) -> tuple[bool, bool, bool, int]:
@@ -227,7 +227,7 @@ class Class:
             "Ann": Truth(1),
             "Bob": Truth(2),
             "Eve": Truth(3),
-            "Dan": Truth(4, presence="has not come"),
+            "Dan": Truth(4, presence="not here yet"),
         }
         self.task, self.led = EXERCISE, False
 
@@ -306,7 +306,7 @@ class Class:
 
     def _counts(self, said: str) -> str:
         facts = {each: self._count(progress=each) for each in SYMBOLS if each != "away"}
-        for words, count in (facts | {"has not come": len(self.truth) - self._count()}).items():
+        for words, count in (facts | {"not here yet": len(self.truth) - self._count()}).items():
             if (f"{count} {words}" in said) != (count > 0 or words in ("stuck", "at it", "solved")):
                 return f"the results count {said!r}: {count} {words}"
         return ""

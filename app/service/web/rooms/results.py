@@ -49,7 +49,7 @@ class Results:
         token = request.cookies.get(COOKIE, "")
         room, sent, table, attempts, compared = await run_in_threadpool(self._read, token)
         shown = await run_in_threadpool(lambda: _rows(self._known(sent), table[:MOST]))
-        states = ("stuck", "gave up", "not begun", "at it", "solved", "has not come")
+        states = ("stuck", "gave up", "not begun", "at it", "solved", "not here yet")
         counted = [row for row in table if not sent.task or row.exercise == sent.task]
         counts = {state: sum(row.state == state for row in counted) for state in states}
         pairs, found = compared

@@ -204,7 +204,7 @@ ALONE = "by themselves"
         ({"away": True, "driven": "SO-101", "work": work(1.0)}, "away", "solved", "away · solved · 1 try"),
         ({"task": "swing", "hand": 3.0, "work": work(1.0)}, ALONE, "solved", "hand up · solved · 1 try"),
         ({"away": True, "work": work(1.0)}, "away", "solved", "away · solved · 1 try"),
-        ({"away": True, "seen": False}, "has not come", "not begun", "has not come"),
+        ({"away": True, "came": False}, "not here yet", "not begun", "not here yet"),
         ({"task": "x", "work": work(0, 0, exercise="x")}, ALONE, "not begun", "not begun · at the arm"),
     ],
 )
@@ -255,7 +255,7 @@ def test_list_chips_bar_and_task_say_the_same_of_thirty() -> None:
     ]
     seats[20] = replace(seats[20], away=True, work=work(0, 0, 0))
     seats[21] = replace(seats[21], work=work(0, 0, 0))
-    seats += [SeatView("28", "S28", away=True, seen=False), SeatView("29", "S29", away=True, seen=False)]
+    seats += [SeatView("28", "S28", away=True, came=False), SeatView("29", "S29", away=True, came=False)]
     room = RoomView("r", follow=True, task=Task("swing", 1.0), seats=tuple(seats), students=30)
     bar = plain(views.teacher_bar(room, None, False, 0))
     assert "You lead 24 of 28 students · 3 by themselves · 1 away · 2 stuck" in bar
@@ -263,7 +263,7 @@ def test_list_chips_bar_and_task_say_the_same_of_thirty() -> None:
     chips = plain(views.tools_html(room, False, False))
     for fact in ("1 hand up", "2 stuck", "16 not begun", "10 solved", "24 following", "3 by themselves", "1 away"):
         assert fact in chips, fact
-    assert "2 never came" in chips
+    assert "2 not here yet" in chips
     above, rest = views.list_html(room, "21", EXERCISES, SENT)
     order = re.findall(r'data-question-key="(\d+)"', above + rest)
     assert [order[0], order[1], *order[-3:]] == ["9", "21", "20", "28", "29"]
