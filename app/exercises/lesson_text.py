@@ -32,7 +32,7 @@ same fields::
 Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows
 a wrong one, with the answer as the value of a joint. Of lengths, it is two points: a bar as long as the answer
 leads from one towards the other, as in ``{ from = "tool", to = "target" }``; with `scale`, so many times as
-long. Or it is a ``semi_axis`` of an ellipsoid of the lesson's own, which is drawn with the answer in its place.
+long. Or it is a ``shape`` of the lesson's own, such as an ellipsoid, which is drawn with the answer in its place.
 The options of a choice are drawn as what its `leads` name: directions, poses of the arm, ways and frames of the
 lesson's own. `answered` is a figure of the last answer. What is `withheld` is nowhere to be seen before. `arm`
 is one of the library that shows what this one cannot; a button changes to it. An `estimate` is asked before the
@@ -105,7 +105,7 @@ class StepText:
         questions: alternatives, of which the first whose condition holds is asked; there may be none.
         estimate: what is asked before, as `questions`.
         drawn: how an answer is drawn: a joint value as the pose that has it, with the number of the joint; a
-            length as a bar, or as the semi-axis of this name.
+            length as a bar; or the shape of this name.
         arm: when another arm is offered, and its id.
         answered: the name of a figure of the answer.
     """
@@ -236,8 +236,8 @@ def _drawn(fields: Fields) -> tuple[str, int] | BarText | str:
         bar = BarText(_point(fields, "from"), _point(fields, "to"), fields.expression("scale", "1"))
         fields.done()
         return bar
-    if fields.has("semi_axis"):
-        name = fields.text("semi_axis")
+    if fields.has("shape"):
+        name = fields.text("shape")
         fields.done()
         return name
     found = fields.text("pose"), fields.whole("joint", 1, MOST_JOINTS)

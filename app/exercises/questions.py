@@ -125,6 +125,11 @@ class Question(ABC):
     def judge(self, answer: Any) -> Verdict:
         """Judge a kept answer."""
 
+    def compared(self, answer: Any, before: Any) -> str:
+        """What is said of a wrong answer beside the wrong one before it, which was another one; "": nothing."""
+        alike = self.judge(answer).reason == self.judge(before).reason
+        return "The same holds for your answer before." if alike else ""
+
     @abstractmethod
     def right(self) -> object:
         """A right answer, as it is kept."""
@@ -276,6 +281,14 @@ class Number(Question):
         if self.models is not None and (model := self.models.named([answer])) is not None:
             return Verdict(False, model.said, way=self.method, cause=model.code, mistaken=model.variant)
         return Verdict(False, self._what_is_wrong(answer), way=self.method)
+
+    def compared(self, answer: float, before: float) -> str:
+        if not self.ordered or self.whole_turns:
+            return super().compared(answer, before)
+        rights = (self.answer, *(way.value for way in self.ways))
+        far, was = (min(abs(value - right) for right in rights) for value in (answer, before))
+        nearer = "nearer" if far < was else "no nearer"
+        return f"It is {nearer} than {self.unit.brief(before, 6)}, your answer before."
 
     def right(self) -> float:
         return self.answer

@@ -23,7 +23,7 @@ from kin.transforms import Array, wxyz_from_rotation
 MOST = 8  # workpieces of a page
 NAME = 24  # characters
 FARTHEST = 1000.0  # m
-TITLES = {WORLD: "world", BASE: "base: the foot of the arm"}
+TITLES = {WORLD: "world", BASE: "base: frame 0 of the arm"}
 _DIGITS = 12  # of metres and radians in a link
 
 

@@ -49,8 +49,17 @@ class OrderKind(Kind):
         return product(matrices[::-1] if self.fixed_axes else matrices)
 
     def _is_right(self, variant: Variant, order: Sequence[int]) -> bool:
-        right = self._product(variant, range(len(self.motions)))
-        return max(errors(self._product(variant, order), right)) < _CLOSE
+        return self._same(variant, order, range(len(self.motions)))
+
+    def _same(self, variant: Variant, one: Sequence[int], other: Sequence[int]) -> bool:
+        """Whether two orders have the same product."""
+        return max(errors(self._product(variant, one), self._product(variant, other))) < _CLOSE
+
+    def leads(self, variant: Variant, given: Sequence[int]) -> Array:
+        """Where the motions carry a frame in the order of an answer: poses ``(n + 1, 4, 4)`` from the start."""
+        places = self._places(variant)
+        order = [places[i] for i in given]
+        return np.stack([self._product(variant, order[:k]) for k in range(len(order) + 1)])
 
     def asked(self, variant: Variant, units: Units) -> Asked:
         labels = tuple(self.motions[i].text(variant, units) for i in self._places(variant))
@@ -73,7 +82,7 @@ class OrderKind(Kind):
             for right in permutations(range(n))
             if self._is_right(variant, right)
         )
-        if self._is_table_row() and self._is_right(variant, [*order[2:], *order[:2]]):
+        if (crossed := self._other_row(variant)) and self._same(variant, order, crossed):
             why = (
                 "This order is correct for the other convention, which begins with the other pair of motions: "
                 "both of x, or both of z."
@@ -92,11 +101,16 @@ class OrderKind(Kind):
             why = f"After this order, which begins with “{first}”, the frame is {' and '.join(ends)}."
         return Verdict(False, why, round(credit, 3))
 
-    def _is_table_row(self) -> bool:
-        """Whether the motions are the four of a row, in either convention."""
-        return (
-            len(self.motions) == 4 and {motion.axis for motion in self.motions} == {0, 2} and not self.fixed_axes
-        )
+    def _other_row(self, variant: Variant) -> list[int]:
+        """The four motions as a row of the other convention; empty if they are no row of either."""
+        z, x = ([i for i, motion in enumerate(self.motions) if motion.axis == axis] for axis in (2, 0))
+        pairs = [sorted(self.motions[i].turns for i in pair) for pair in (z, x)]
+        if len(self.motions) == 4 and pairs == [[False, True]] * 2 and not self.fixed_axes:
+            if self._is_right(variant, z + x):
+                return x + z
+            if self._is_right(variant, x + z):
+                return z + x
+        return []
 
     def answer(self, variant: Variant) -> object:
         places = self._places(variant)

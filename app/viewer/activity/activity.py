@@ -27,6 +27,7 @@ REVIEW: Final = "review"
 # What questions may withhold, and what is then absent from panel, scene, read-out and messages.
 FACTS: Final = {
     "table": "the table of the arm, in every form",
+    "order": "in which order the motions of a row are done",
     "motions": "how far a row of the table turns or slides with its joint where it is now",
     "position": "the position of the tool in the read-out",
     "angles": "roll, pitch and yaw in the read-out",

@@ -40,6 +40,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
 
     key = "dh"
     by_rows = True
+    through = True
     title = "DH table step by step"
     computes = False
     about = "How four motions per row lead from the base to the tool, one after another."
@@ -96,7 +97,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         comparison = (robot, f.other, f.q, f.other_place, f.apart, units, asked) if s.compare else ()
         return [
             first,
-            Html(views.caption_html, (robot, f.place, units, asked), key="caption"),
+            Html(views.caption_html, (robot, f.place, units, asked, not self.hides("order")), key="caption"),
             Control("at"),
             Buttons("Motion", motions, MOTION_HINT, offered),
             Html(views.table_html, (robot, f.q, f.place, units, "", (), asked), key="table"),

@@ -34,6 +34,7 @@ ROW = {  # an example whose motions do not commute
 _SKEW = 0.01  # sine of a twist that turns the next axis
 RELATIONS = ("one", "parallel", "perpendicular", "meet", "skew")  # by their numbers in the file
 LYING = ("one line", "parallel", "right angle", "another angle", "skew")  # what the options of these are drawn as
+ALIKE = 1.25  # of two lengths that look alike, one by the other
 OFF = 0.15  # of the reach: between two lines that do not meet
 VERDICTS = ("identical", "same", "different")
 
@@ -61,6 +62,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "pair_next": pair + 1,
         "end": end,
         "end_next": end + 1,
+        **where(robot),
         "swings": robot.revolute[0],
         "way": distance(fk(robot, robot.q_home), fk(robot, q)),
         "radius": _radius(robot),
@@ -91,17 +93,27 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     return LessonFacts({**values, **ROW}, functions, words, poses, leads=leads(robot, pair))
 
 
+def where(robot: Robot) -> dict[str, bool]:
+    """Whether the tool at home is above, beside or below frame 0's origin; near the diagonal, two of these."""
+    way = fk(robot, robot.q_home)[:3, 3] - robot.T_world_base[:3, 3]
+    side, up = float(np.hypot(way[0], way[1])), float(way[2])
+    return {
+        "above": ALIKE * up > side,
+        "beside": ALIKE * side >= abs(up),
+        "below": -ALIKE * up > side,
+    }
+
+
 def leads(robot: Robot, pair: int) -> dict[str, Lead | None]:
-    """Where options lead: from the base to the tool, and along a second axis that lies as an option says.
+    """Where options lead: from frame 0 to the tool, and along a second axis that lies as an option says.
 
     Args:
         pair: the number of the first of two axes; the second is where the option says, and truly where it is.
     """
     base, tool = robot.T_world_base[:3, 3], fk(robot, robot.q_home)[:3, 3]
     way = tool - base
-    side, up = float(np.hypot(way[0], way[1])), float(way[2])
     ways = {"above": UP, "beside": level(way), "below": DOWN}
-    ways["above" if up > side else "below" if -up > side else "beside"] = way
+    ways |= {name: way for name, holds in where(robot).items() if holds}
     found = {name: direction(robot, base, each) for name, each in ways.items()}
     if robot.n < 2:
         return {**found, **dict.fromkeys(LYING)}

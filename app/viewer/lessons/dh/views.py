@@ -49,16 +49,19 @@ def color(factor: Factor, strength: float = 1.0) -> str:
     return f"rgba({r},{g},{b},{strength:g})"
 
 
-def caption_html(robot: Robot, at: WalkState, units: Units, asked: bool = False) -> str:
+def caption_html(robot: Robot, at: WalkState, units: Units, asked: bool = False, in_order: bool = True) -> str:
     """The present motion, in words and highlighted in the row's product of four. The height is constant.
 
-    `asked`: without what a joint makes of its row, here and in all tables.
+    `asked`: without what a joint makes of its row, here and in all tables; `in_order`: with the factors.
     """
-    return render("dh/caption", words=caption(robot, at, units, asked), formula=_product(robot, at, units))
+    formula = _product(robot, at, units, in_order)
+    return render("dh/caption", words=caption(robot, at, units, asked), formula=formula)
 
 
-def _product(robot: Robot, at: WalkState, units: Units) -> Markup:
+def _product(robot: Robot, at: WalkState, units: Units, in_order: bool) -> Markup:
     parts = [m.sub(m.ident("A"), m.short(at.row + 1)), m.op("=")]
+    if not in_order:
+        return m.math(*parts, m.text("?"), size=1.05)
     for k, factor in enumerate(ORDERS[robot.convention]):
         parts.append(m.gap())
         name = m.sub(m.text("R" if turns(factor) else "T"), m.ident("xyz"[axis(factor)]))

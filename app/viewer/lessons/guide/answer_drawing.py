@@ -5,15 +5,21 @@ Wrong answers are vermilion and broken, right ones green and whole.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from app.exercises.contract import Posed
+from app.exercises.kinds.frame import FrameKind
+from app.exercises.kinds.order import OrderKind
 from app.exercises.questions import Choice, Number, Question
 from app.viewer.declared.scene import Color, Node, axes, bars, label
 from app.viewer.exercises.drawing import OPACITY, SIZE
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
-from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, SemiAxis, Step, Triad
+from app.viewer.lessons.guide.outline import Bar, Cosine, Drawn, Ghost, Lead, Leads, Path, SemiAxis, Step, Triad
+from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body
+from app.viewer.scene.viewpoints import UP
 from app.viewer.skeleton import ghost
 from kin import Robot, fk, link_frames
 from kin.transforms import Array, pose_from_position_wxyz
@@ -23,7 +29,9 @@ THICK, DASHES = 0.6, 9  # of a bar, in the arm's thickness; parts of a broken on
 FARTHEST = 1.2  # reaches of the arm that a wrong bar is long at most; its label has the value
 CUT = "drawn shorter"  # the label of a bar that would be longer
 TIP = 0.12, 0.5  # of a bar that is cut: the length of its head, of the bar's, and its half width, of the head's
-ASIDE = 1.4  # from the broken bar to the whole one, in the arm's thickness
+# From the whole bar to the broken one, in the arm's thickness: across it, and towards the viewer by more than half
+# a gripper, which would hide the bar.
+ASIDE, AHEAD = 1.4, 1.6
 ROUND, THIN = 48, 0.4  # parts of an ellipse, of which a broken one has every other; its thickness, of a bar's
 
 
@@ -43,10 +51,21 @@ def answer_nodes(robot: Robot, step: Step, given: object, closed: bool) -> list[
                 words = f"right: {question.value_text}"
                 nodes += _length("right", robot, step.drawn, question.answer, words, GREEN, broken=False)
             return nodes
+        case Cosine() if isinstance(step.question, Number):
+            nodes, drawn = list[Node](), step.drawn
+            if isinstance(given, float | int) and not step.question.judge(float(given)).right:
+                nodes += _lead("wrong", robot, drawn.at(float(given)), YOURS, VERMILION, broken=True)
+            if closed:
+                nodes += _lead("right", robot, drawn.at(step.question.answer), "right", GREEN, broken=False)
+            return nodes
         case Leads():
             return lead_nodes(robot, step.question, step.drawn, given, closed)
-    if isinstance(step.question, Posed) and step.question.asked().form == "frame":
-        return _frame_nodes(robot, step.question, given, closed)
+    if isinstance(step.question, Posed):
+        match step.question.kind:
+            case FrameKind():
+                return _frame_nodes(robot, step.question, given, closed)
+            case OrderKind():
+                return _order_nodes(robot, step.question, step.question.kind, given, closed)
     return []
 
 
@@ -119,6 +138,25 @@ def _frame_nodes(robot: Robot, question: Posed, given: object, closed: bool) -> 
     return nodes
 
 
+def _order_nodes(robot: Robot, question: Posed, kind: OrderKind, given: object, closed: bool) -> list[Node]:
+    """Where the motions lead frame 0, and on which way: in the order of a wrong answer, and in the right one."""
+    nodes, orders = list[Node](), dict[str, Any]()
+    if question.is_answer(given) and not question.judge(given).right:
+        orders["wrong"] = given
+    if closed:
+        orders["right"] = question.right()
+    for key, order in orders.items():
+        wrong = key == "wrong"
+        color, words = (VERMILION, YOURS) if wrong else (GREEN, "right")
+        places = robot.T_world_base @ kind.leads(question.variant, order)
+        moved = np.linalg.norm(np.diff(places[:, :3, 3], axis=0), axis=1) > 1e-9
+        way = places[[True, *moved.tolist()], :3, 3]
+        nodes += _frame(key, places[-1], SIZE * robot.reach, words, color, broken=wrong)
+        if len(way) > 1:
+            nodes.append(_line(f"{key}-way", robot, way, color, broken=wrong))
+    return nodes
+
+
 def _pose_of(given: object) -> Array:
     values = np.array(given, dtype=float)
     return pose_from_position_wxyz(values[:3], values[3:])
@@ -146,7 +184,7 @@ def _bar(key: str, robot: Robot, bar: Bar, value: float, words: str, color: Colo
     cut = abs(bar.scale * value) > most
     end = start + min(max(bar.scale * value, -most), most) * direction
     if broken:  # beside the whole one, which has its place between the points
-        aside = ASIDE * size * _across(direction)
+        aside = size * (ASIDE * _across(direction) + AHEAD * _across(direction, DIRECTION))
         start, end = start + aside, end + aside
     ends, place = np.linspace(start, end, 2 * DASHES if broken else 2).reshape(-1, 2, 3), end
     if cut:  # long words at the end would leave the picture
@@ -190,8 +228,9 @@ def _ellipsoid(
     ]
 
 
-def _across(direction: Array) -> Array:
-    """A direction perpendicular to one, as upright as it can be."""
-    up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
-    across = up - (up @ direction) * direction
+def _across(direction: Array, toward: Array = UP) -> Array:
+    """A direction perpendicular to one, as near as it can be to another, or to x if that is along the first."""
+    toward = toward / np.linalg.norm(toward)
+    toward = toward if abs(toward @ direction) < 0.9 else np.array([1.0, 0.0, 0.0])
+    across = toward - (toward @ direction) * direction
     return np.asarray(across / np.linalg.norm(across))

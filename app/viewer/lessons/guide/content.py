@@ -27,6 +27,7 @@ from app.exercises.worked import WorkedText
 from app.viewer.lessons.guide.outline import (
     Answered,
     Bar,
+    Cosine,
     Drawn,
     Lead,
     Leads,
@@ -54,7 +55,7 @@ class LessonFacts:
         figures: those that are shown with an answer.
         answered: figures of an answer, by the names that steps give.
         leads: where options of choices lead, by the names that questions give; None: nowhere on this arm.
-        semi_axes: of ellipsoids, as which answers are drawn.
+        shapes: as which answers are drawn, such as a semi-axis of an ellipsoid.
     """
 
     numbers: Mapping[str, float | Quantity]
@@ -64,7 +65,7 @@ class LessonFacts:
     figures: Mapping[str, Markup] = field(default_factory=dict)
     leads: Mapping[str, Lead | None] = field(default_factory=dict)
     answered: Mapping[str, Answered] = field(default_factory=dict)
-    semi_axes: Mapping[str, SemiAxis] = field(default_factory=dict)
+    shapes: Mapping[str, SemiAxis | Cosine] = field(default_factory=dict)
 
 
 @cache
@@ -136,7 +137,7 @@ class _Maker:
         known = {**self.facts.leads, NO_PREVIEW: None}
         return Leads(tuple(self.named("leads", name, known) for name in names))
 
-    def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | SemiAxis | Leads | None:
+    def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | SemiAxis | Cosine | Leads | None:
         """How answers to a step are drawn."""
         if (leads := self.leads(asked)) is not None:
             return leads
@@ -147,7 +148,7 @@ class _Maker:
             case (name, joint):
                 return self._joint(name, joint)
             case str(name):
-                return self.named("drawn.semi_axis", name, self.facts.semi_axes)
+                return self.named("drawn.shape", name, self.facts.shapes)
         return None
 
     def _point(self, text: StepText, given: str | tuple[Expression, ...]) -> tuple[float, ...]:

@@ -230,6 +230,8 @@ class Guide(Feature):
         self._example.close()
         self._drawing.clear()
         self._copies.remove()
+        if len(self._answer_ends):
+            self._see_through(False)
         self._show_joints(False)
         self.stage.activity.asked = frozenset()
 
@@ -406,7 +408,13 @@ class Guide(Feature):
         found = np.concatenate([ends(nodes), self._ghost_room()])
         if not np.array_equal(found, self._answer_ends):
             self._answer_ends = found
+            self._see_through(bool(nodes))
             self.stage.keep_in_view(self._target, found)
+
+    def _see_through(self, on: bool) -> None:
+        """Let the arm hide nothing of an answer that is drawn."""
+        if not self._lesson.through:
+            self.stage.see_through(on, gizmo=True)
 
     def _ghost_room(self) -> Array:
         """The corners ``(n, 3)`` of a cube with the frame that is asked for: they tell how far, not which way."""

@@ -21,11 +21,14 @@ class Lesson(Feature, ABC):
     Attributes:
         computes: whether it solves the pose, or has a scene of its own. Links do not open it for visitors who may
             only look.
+        through: whether it says itself when the arm is transparent. Otherwise it is while an answer is drawn, so
+            that the arm does not hide it.
         by_rows: whether it takes each moving row of the table for a joint, so that it is not for arms with rows
             that follow joints.
     """
 
     computes: ClassVar[bool] = True
+    through: ClassVar[bool] = False
     by_rows: ClassVar[bool] = False
 
     @staticmethod

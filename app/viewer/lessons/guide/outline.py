@@ -6,9 +6,11 @@ in radians, metres and SI units.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 from markupsafe import Markup
 
 from app.exercises.questions import (
@@ -24,6 +26,8 @@ from app.exercises.questions import (
     one_right,
     two_percent,
 )
+from kin.axes import perpendicular_to
+from kin.transforms import Array
 from kin.units import PLAIN
 
 __all__ = [
@@ -32,6 +36,7 @@ __all__ = [
     "Bar",
     "Choice",
     "Configuration",
+    "Cosine",
     "Drawn",
     "Ghost",
     "Lead",
@@ -125,6 +130,33 @@ class SemiAxis:
     scale: float = 1.0
 
 
+@dataclass(frozen=True, eq=False)
+class Cosine:
+    """How an entry of a rotation is drawn: as the direction that has it as the cosine of its angle to an axis.
+
+    Attributes:
+        start: where the direction is drawn from, ``(3,)`` (m).
+        axis: the axis, a unit vector ``(3,)``.
+        right: the direction with the right entry, as `axis`; the others lie in the plane of both.
+        length: how long it is drawn (m).
+    """
+
+    start: Array
+    axis: Array
+    right: Array
+    length: float
+
+    def at(self, entry: float) -> Bar | None:
+        """The direction with a typed entry; None: no cosine is so large."""
+        if abs(entry) > 1.0 + 1e-9:
+            return None
+        across = self.right - (self.right @ self.axis) * self.axis
+        size = float(np.linalg.norm(across))
+        across = across / size if size > 1e-9 else perpendicular_to(self.axis)
+        way = entry * self.axis + math.sqrt(max(0.0, 1.0 - entry * entry)) * across
+        return Bar(tuple(self.start.tolist()), tuple((self.start + self.length * way).tolist()))
+
+
 @dataclass(frozen=True)
 class Ghost:
     """An option that leads the arm to a configuration ``(n,)``: a copy of it is drawn there."""
@@ -188,7 +220,7 @@ class Step:
     practice: str = ""
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
-    drawn: Drawn | Bar | SemiAxis | Leads | None = None
+    drawn: Drawn | Bar | SemiAxis | Cosine | Leads | None = None
     estimate: Question | None = None
     guessed: Leads | None = None
     answered: Answered | None = None

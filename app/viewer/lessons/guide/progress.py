@@ -12,6 +12,7 @@ from kin import InputError
 Mark = Literal["open", "right", "wrong", "shown"]
 MOST_MISSES = 99
 WAY_AFTER = 2  # misses: before, only what is wrong with the answer is said
+LOOK_AGAIN = "Look again; after another answer, the way to it is shown."
 
 
 class Progress:
@@ -22,6 +23,7 @@ class Progress:
         given: the last answer to each question, by its key, as `Question.read` returns it.
         revealed: keys of the questions whose answers were requested before they were right.
         misses: how many wrong answers each question got.
+        before: the wrong answer before the last one, if that was wrong too.
         earlier: what the check asks of earlier lessons, by key; it does not count for passing.
     """
 
@@ -30,6 +32,7 @@ class Progress:
         self.given: dict[str, Any] = {}
         self.revealed: set[str] = set()
         self.misses: dict[str, int] = {}
+        self.before: dict[str, Any] = {}
         self.earlier: dict[str, Question] = {}
         self.use(outline)
 
@@ -70,6 +73,8 @@ class Progress:
         if not self.is_closed(name):
             if not verdict.right and self.given.get(name) != answer:
                 self.misses[name] = min(self.misses.get(name, 0) + 1, MOST_MISSES)
+                if name in self.given:
+                    self.before[name] = self.given[name]
             self.given[name] = answer
         return verdict
 
@@ -85,6 +90,7 @@ class Progress:
         self.given.clear()
         self.revealed.clear()
         self.misses.clear()
+        self.before.clear()
 
     def again(self, key: object) -> None:
         """Go to a question, and ask it as if it had not been answered; raises `kin.InputError` for another key."""
@@ -94,6 +100,7 @@ class Progress:
         self.given.pop(name, None)
         self.revealed.discard(name)
         self.misses.pop(name, None)
+        self.before.pop(name, None)
 
     def verdict(self, key: str) -> Verdict | None:
         """The verdict on the last answer; None if there is none."""
@@ -109,9 +116,10 @@ class Progress:
         verdict = self.verdict(key)
         if verdict is None:
             return ""
-        if verdict.right or self.misses.get(key, 0) >= WAY_AFTER:
-            return verdict.full
-        return verdict.reason or "Look again; after another answer, the way to it is shown."
+        if verdict.right or self.misses.get(key, 0) < WAY_AFTER:
+            return verdict.full if verdict.right else verdict.reason or LOOK_AGAIN
+        compared = self._questions[key].compared(self.given[key], self.before[key]) if key in self.before else ""
+        return " ".join(filter(None, (verdict.reason, compared, verdict.way)))
 
     def mark(self, key: str) -> Mark:
         """What has become of a question."""
@@ -149,17 +157,14 @@ class Progress:
     def state(self) -> dict[str, object]:
         """As JSON."""
         state = {"step": self.at, "given": dict(self.given), "revealed": sorted(self.revealed)}
-        return {**state, "misses": dict(self.misses)} if self.misses else state
+        more = {"misses": dict(self.misses), "before": dict(self.before)}
+        return {**state, **{name: values for name, values in more.items() if values}}
 
     def restore(self, state: dict[str, object]) -> None:
         """Take what `state` returned; invalid entries are ignored, and answers are judged again."""
-        at, given, revealed = state.get("step"), state.get("given"), state.get("revealed")
-        self.at = at if type(at) is int and 0 <= at <= len(self.outline.steps) else 0
-        self.given = {
-            key: value
-            for key, value in (given.items() if isinstance(given, dict) else ())
-            if key in self._questions and self._questions[key].is_answer(value)
-        }
+        at, revealed = state.get("step"), state.get("revealed")
+        self.at = min(at, len(self.outline.steps)) if type(at) is int and at >= 0 else 0  # another arm has fewer
+        self.given, self.before = (self._answers(state.get(name)) for name in ("given", "before"))
         keys = revealed if isinstance(revealed, list) else []
         self.revealed = {key for key in keys if isinstance(key, str) and key in self._questions}
         misses = state.get("misses")
@@ -167,4 +172,12 @@ class Progress:
             key: value
             for key, value in (misses.items() if isinstance(misses, dict) else ())
             if key in self._questions and type(value) is int and 0 < value <= MOST_MISSES
+        }
+
+    def _answers(self, entry: object) -> dict[str, Any]:
+        """Those of a link, by question, that can be answers."""
+        return {
+            key: value
+            for key, value in (entry.items() if isinstance(entry, dict) else ())
+            if key in self._questions and self._questions[key].is_answer(value)
         }

@@ -48,6 +48,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     key = "inverse"
     by_rows = True
+    through = True
     title = "Inverse kinematics step by step"
     about = "From a target to the joint angles by hand, and where each solution comes from."
     outline = staticmethod(outline)

@@ -133,7 +133,7 @@ def _estimate(given: Exercise) -> Choice:
             tuple(Option(text, why, right) for text, right in found),
         )
     up = float(given.T[2, 2])
-    why = f"The tool points along a, whose z component is {fixed(up)}. The wrist centre is back against a."
+    why = "The wrist centre is back along the line in which the tool points."
     directions = (("Up", up > LEVEL), ("Level, or nearly so", abs(up) <= LEVEL), ("Down", up < -LEVEL))
     return Choice(
         "Look at the arm, whose tool is at the target: which way does the tool point?",

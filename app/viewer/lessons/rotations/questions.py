@@ -10,11 +10,12 @@ import numpy as np
 from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import direction, place, up_or_down
-from app.viewer.lessons.guide.outline import Configuration, Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Configuration, Cosine, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
 from app.viewer.lessons.rotations.drawing import LENGTH, anchor
 from app.viewer.lessons.rotations.frames import Motion, as_json, places
+from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.chain import rotation
 from app.viewer.scene.meshes import body
 from kin import Robot, fk
@@ -23,6 +24,7 @@ from kin.transforms import Array
 from kin.units import Units, fixed
 
 _SAMPLES, LEVEL = 64, 0.1  # configurations; the vertical part of a direction that is nearly level
+SEEN = 0.5  # share of its length that an axis has in the default view at least
 ZYZ = Convention("zyz", False)
 TWO_TURNS = Motion(True, 2, math.pi / 2, True), Motion(True, 0, math.pi / 2, True)
 # The 1st and the 3rd axis coincide.
@@ -37,10 +39,12 @@ def outline(robot: Robot, units: Units) -> Outline:
 
 @lru_cache(maxsize=64)
 def example(robot: Robot) -> Array:
-    """A configuration near home in which the tool is turned about all axes, if it can be."""
+    """A configuration near home in which the tool is turned about all axes, if it can be, all well seen."""
     q = robot.q_home + 0.5 * (robot.random_q(np.random.default_rng(5), _SAMPLES) - robot.q_home)
-    R = np.abs(fk(robot, q)[:, :3, :3]).reshape(_SAMPLES, 9)
-    return np.asarray(q[int(np.argmax(R.min(axis=1)))])
+    R = fk(robot, q)[:, :3, :3]
+    ahead = np.abs(DIRECTION @ R / np.linalg.norm(DIRECTION)).max(axis=1)
+    seen = ahead < math.sqrt(1.0 - SEEN**2)
+    return np.asarray(q[int(np.argmax(seen + np.abs(R).reshape(_SAMPLES, 9).min(axis=1)))])
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:
@@ -93,7 +97,12 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     }
     poses = _poses(robot, start, R)
     values = {name: x if isinstance(x, Quantity) else float(x) for name, x in numbers.items()}
-    return LessonFacts(values, {}, words, poses, leads=leads(robot, T))
+    length = LENGTH * body(robot).radius
+    shapes = {
+        "entry": Cosine(anchor(robot), np.eye(3)[row], R[:, column], length),
+        "entry of the inverse": Cosine(anchor(robot), np.eye(3)[j], R[:, i], length),
+    }
+    return LessonFacts(values, {}, words, poses, leads=leads(robot, T), shapes=shapes)
 
 
 def _first_entry(R: Array, k: int, given: set[tuple[int, int]]) -> tuple[int, int]:

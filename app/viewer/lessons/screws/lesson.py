@@ -29,6 +29,7 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
 
     key = "screws"
     by_rows = True
+    through = True
     title = "Screws"
     about = "Each joint axis as six numbers, and the pose of the tool as a product of exponentials."
     outline = staticmethod(outline)

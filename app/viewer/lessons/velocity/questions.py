@@ -83,7 +83,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     if found is not None:
         poses["singularity"] = Pose(as_configuration(found[0]))
     drawn = {"fastest": semi_axis(robot, there_asked, U_asked, asked, axes)}
-    return LessonFacts(numbers, functions, words, poses, leads=lead, semi_axes=drawn)
+    return LessonFacts(numbers, functions, words, poses, leads=lead, shapes=drawn)
 
 
 @lru_cache(maxsize=64)

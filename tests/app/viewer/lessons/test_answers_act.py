@@ -1,7 +1,7 @@
 """A student's answer acts: which kinds are drawn in the scene, and that they lead where they say.
 
-`ACTS` lists the questions of all steps whose answer is a length, a speed, an angle or a time. Choices are in
-test_choices_act.py; counts are not drawn.
+`ACTS` lists the questions of all steps whose answer is a length, a speed, an angle, a time or an entry of a
+rotation. Choices are in test_choices_act.py; counts are not drawn.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.answer_drawing import CUT, DASHES, FARTHEST, answer_nodes
-from app.viewer.lessons.guide.outline import Bar, Drawn, Number, SemiAxis, Step
+from app.viewer.lessons.guide.outline import Bar, Cosine, Drawn, Number, SemiAxis, Step
+from app.viewer.scene.arm.arm_scene import THROUGH
 from app.viewer.scene.viewpoints import contains
 from app.viewer.server import ViewerServer
 from kin.units import Units
@@ -31,7 +32,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 STORE = Store()
 UR5 = STORE.get("ur5")
-BAR, ARM, FIGURE, AXIS = "a bar", "a copy of the arm", "a figure", "an ellipsoid"
+BAR, ARM, FIGURE, AXIS, WAY = "a bar", "a copy of the arm", "a figure", "an ellipsoid", "a direction"
 ACTS: dict[tuple[str, str], str] = {
     ("dh", "Row # as a distance"): BAR,
     ("dh", "A joint and its column"): BAR,
@@ -51,6 +52,8 @@ ACTS: dict[tuple[str, str], str] = {
     ("inverse", "The last joint"): ARM,
     ("trajectories", "How long it takes"): FIGURE,
     ("inverse", "The distance"): BAR,
+    ("rotations", "Columns"): WAY,
+    ("rotations", "The inverse"): WAY,
     # Not drawn, and why.
     ("rotations", "Roll pitch yaw"): "one of three angles: what the frame does depends on the two others",
     ("rotations", "The same in Z-Y-Z"): "one of three angles: what the frame does depends on the two others",
@@ -77,20 +80,22 @@ def steps() -> Iterator[tuple[kin.Robot, tuple[str, str], Step]]:
 def is_measured(step: Step) -> bool:
     assert isinstance(step.question, Number)
     unit = step.question.unit
-    return unit.is_length or unit.is_angle or unit.name in ("m/s", "°/s", "s")
+    drawn = isinstance(step.drawn, Cosine)
+    return drawn or unit.is_length or unit.is_angle or unit.name in ("m/s", "°/s", "s")
 
 
 def test_the_list_of_answers_that_act_is_complete() -> None:
     found: dict[tuple[str, str], set[str]] = {}
     for _, name, step in steps():
         if is_measured(step):
-            kind = {Bar: BAR, Drawn: ARM, SemiAxis: AXIS}.get(type(step.drawn), "none")  # type: ignore[call-overload]
+            kinds = {Bar: BAR, Drawn: ARM, SemiAxis: AXIS, Cosine: WAY}
+            kind = kinds.get(type(step.drawn), "none")  # type: ignore[call-overload]
             kind = FIGURE if step.answered is not None else kind
             found.setdefault(name, set()).add(kind)
     assert found.keys() == ACTS.keys()
     assert {name: kinds for name, kinds in found.items() if kinds != {ACTS[name]} and kinds != {"none"}} == {}
     assert {name for name, kinds in found.items() if kinds == {"none"}} == {
-        name for name, how in ACTS.items() if how not in (BAR, ARM, FIGURE, AXIS)
+        name for name, how in ACTS.items() if how not in (BAR, ARM, FIGURE, AXIS, WAY)
     }
 
 
@@ -249,6 +254,12 @@ def test_a_typed_length_is_drawn_and_the_right_one_only_when_it_is_on_show(serve
         found = (name for name in tab.nodes if name.startswith("/answer-") and tab.visible.get(name, True))
         return {name.split("/")[-1].partition("~")[0] for name in found} - {""}
 
+    def through(tab: FakeBrowser) -> bool:
+        """Whether the arm hides nothing of the answer."""
+        return any(
+            m["props"].get("opacity") == THROUGH for name, m in tab.nodes.items() if name.startswith("/arm-")
+        )
+
     with FakeBrowser(server) as tab:
         tab.settle()
         tab.choose(UR5.name)
@@ -257,11 +268,13 @@ def test_a_typed_length_is_drawn_and_the_right_one_only_when_it_is_on_show(serve
         tab.say("feature", ["guide", ["fields", "1", 1], [["0.9 m"]]])
         tab.wait(lambda: "wrong" in nodes(tab))
         assert "right" not in nodes(tab)
+        tab.wait(lambda: through(tab))
         assert any("your answer: 900" in str(m["props"].get("text")) for m in tab.nodes.values())
         tab.say("feature", ["guide", ["reveal", "1", 2], None])
         tab.wait(lambda: {"wrong", "right"} <= nodes(tab))
         tab.say("feature", ["guide", ["go", 3], 1])
         tab.wait(lambda: not nodes(tab) & {"wrong", "right"})
+        tab.wait(lambda: not through(tab))
 
 
 def picture(tab: FakeBrowser) -> np.ndarray:

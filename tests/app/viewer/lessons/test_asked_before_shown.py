@@ -195,6 +195,16 @@ def test_the_reason_of_an_estimate_does_not_answer_the_question_after_it(lesson:
         assert not given_away(robot, lesson.outline(robot, UNITS)), robot.id
 
 
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_the_reason_of_an_estimate_speaks_of_what_is_seen(lesson: Any) -> None:
+    """Of no symbol, matrix or number of a computation: these are what is asked next."""
+    computed = re.compile(r"[₀-₉]|\bp[xyz]\b|\b(column|entry|component|matrix|Jacobian|determinant)\b|\d\.\d{2}")
+    for robot in CLASSICS:
+        for step in lesson.outline(robot, UNITS).steps:
+            for option in step.estimate.options if isinstance(step.estimate, Choice) else ():
+                assert not computed.search(option.reason), (robot.id, option.reason)
+
+
 def test_a_reason_that_answers_the_question_after_it_is_found() -> None:
     numeric = next(lesson for lesson in LESSONS if lesson.key == "numeric")
     outline = numeric.outline(ARMS[1], UNITS)

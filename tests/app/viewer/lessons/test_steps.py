@@ -23,7 +23,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.arm import Arm
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.outline import Choice, Number, Outline, Pose, Step
+from app.viewer.lessons.guide.outline import Choice, Number, Option, Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.rotations.lesson import RotationsLesson
 from app.viewer.lessons.velocity.lesson import VelocityLesson
@@ -406,12 +406,47 @@ def test_the_way_is_shown_at_the_second_miss() -> None:
     progress.answer("1", far)
     assert progress.feedback("1") == "Too large.", "the same answer once more is not another miss"
     progress.answer("1", 1.1 * far)
-    assert progress.feedback("1").startswith("Too large. On a circle")
+    assert re.match(
+        r"Too large\. It is (no )?nearer than .*, your answer before\. On a circle", progress.feedback("1")
+    )
     again = Progress(outline)
     again.restore(progress.state())
     assert again.feedback("1") == progress.feedback("1")
     again.restore({**progress.state(), "misses": {"1": -1, "9": 2, "c1": "x"}})
     assert again.misses == {}
+
+
+def test_three_wrong_tries_get_three_answers() -> None:
+    asked = 0
+    for lesson in LESSONS:
+        outline = lesson.outline(UR5, DEGREES)
+        progress = Progress(outline)
+        for key, question in outline.questions():
+            if not isinstance(question, Number) or not question.ordered or question.whole_turns:
+                continue
+            tries = [question.answer + share * (1.0 + abs(question.answer)) for share in (3.0, 3.5, 4.0)]
+            said = []
+            for wrong in tries:
+                assert not progress.answer(key, wrong).right
+                said.append(progress.feedback(key))
+            assert len(set(said)) == 3, (lesson.key, key, said)
+            assert said[1].count("no nearer than") == said[2].count("no nearer than") == 1
+            progress.answer(key, tries[0])
+            assert " nearer than" in progress.feedback(key)
+            asked += 1
+    assert asked > 30
+
+
+def test_what_is_wrong_with_two_answers_alike_is_said_once_more() -> None:
+    step = VelocityLesson.outline(UR5, DEGREES).steps[0]
+    option = Option("right", "So.", right=True)
+    question = Choice("?", (option, Option("a", "Not so."), Option("b", "Not so."), Option("c", "Other.")))
+    progress = Progress(Outline("", (replace(step, question=question, estimate=None),), ()))
+    said = []
+    for wrong in (1, 2, 3):
+        progress.answer("1", wrong)
+        said.append(progress.feedback("1"))
+    assert said == ["Not so.", "Not so. The same holds for your answer before.", "Other."]
 
 
 def test_what_a_question_withholds_ends_with_the_answer() -> None:
