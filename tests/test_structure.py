@@ -331,12 +331,10 @@ FIELDS = {
     "Member": 6,
     "ObstaclesFeature": 5,
     "Practising": 11,
-    "ProgramTab": 13,
     "RobotTab": 6,
-    "Screen": 9,
     "Workspace": 2,
 }
-FEATURE = re.compile(r"(Feature|Lesson|Screen)\b")
+FEATURE = re.compile(r"(Feature|Lesson)\b")
 NOT_PRIVATE = {"_replace", "_asdict", "_fields", "_make", "_repr_html_"}  # of named tuples and IPython
 
 

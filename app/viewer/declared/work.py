@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from app.shared.computations import Subscription
+from app.shared.computations import ComputationCache, Subscription
+from app.shared.threads import lower_priority
 from app.viewer.declared.panel import same
 
 _END = object()
+# Nothing is kept: no visitor needs the result of another.
+_ALONE = ComputationCache[Any](ThreadPoolExecutor(64, "visitor-work", lower_priority), 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,14 @@ class Work:
     pace: float = 0.0
     poll: float = 0.0
     keep: bool = False
+
+
+def in_background(compute: Callable[..., Any]) -> Callable[..., Subscription[Any]]:
+    """What begins work in a thread of low priority, for this visitor alone.
+
+    `compute` gets the computation, a `SharedComputation`, before the arguments of the work.
+    """
+    return lambda *args: _ALONE.subscribe(object(), lambda computation: compute(computation, *args))
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 import kin
-from app.viewer.feature import Stage
+from app.viewer.arm import Arm
 from app.viewer.tabs.program.program import Point, Segments, configuration, point, start_of, targets
 from kin import Obstacle, Robot
 from kin.collision.contacts import surroundings
@@ -26,6 +26,8 @@ from kin.units import Units, typeset
 _LOOKS = 200  # times in a spline at which its distance from a point is looked at
 SAME = 1e-6  # rad or m: a locked joint has this value
 LOOSE, SAMPLES = 1e-4, 400  # rad or m on the way, and where it is looked at
+FINEST, MOST_SAMPLES = 0.01, 1200  # s between two samples of the tool's path; samples at most
+KEPT = 32  # plans of all visitors; each is asked for again and again while its program is on show
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +80,21 @@ class Plan:
             found.append(tuple(row))
         return tuple(found)
 
+    @cached_property
+    def waypoints(self) -> Array:
+        """The configurations ``(k, n)`` of all targets."""
+        return np.array([q for row in self.q for q in row])
+
+    @cached_property
+    def path(self) -> tuple[Array, Array]:
+        """Poses ``(k, 4, 4)`` of the tool along what can be driven, and its speed there."""
+        return (np.zeros((0, 4, 4)), np.zeros(0)) if self.driven is None else tool_path(self.driven)
+
+    @property
+    def top_speed(self) -> float:
+        """The largest of these speeds, m/s."""
+        return float(self.path[1].max(initial=0.0))
+
     def _configuration(self, index: int, k: int, target: JointTarget | PoseTarget, seed: Array) -> Array:
         arrival = self.arrival(index)
         if isinstance(target, PoseTarget) and arrival is not None:
@@ -113,16 +130,9 @@ class Plan:
 
     def start_as_recorded(self, index: int) -> tuple[int, Array] | None:
         """The move before a row, and the configuration ``(n,)`` from which the row arrives as recorded."""
-        if index not in self._starts:
-            before = self.before(index) if index < len(self.segments) else None
-            q = None if before is None else start_as_recorded(self.motion, index)
-            self._starts[index] = None if q is None or before is None else (before, q)
-        return self._starts[index]
-
-    @cached_property
-    def _starts(self) -> dict[int, tuple[int, Array] | None]:
-        """What `start_as_recorded` has found."""
-        return {}
+        before = self.before(index) if index < len(self.segments) else None
+        q = None if before is None else start_as_recorded(self.motion, index)
+        return None if q is None or before is None else (before, q)
 
     def can_have_way(self, index: int) -> bool:
         """Whether a way around obstacles can be searched to a row: to one target, from a move before."""
@@ -152,21 +162,29 @@ class Plan:
         return " ".join(note(fact, units) for fact in facts if not isinstance(fact, ArrivesOtherwise))
 
 
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is computed for a row: of which plan, and for which arm."""
+
+    index: int
+    plan: Plan
+    arm: Arm
+
+
+@lru_cache(KEPT)
 def plan(
-    program: Program | None,
+    program: Program,
     robot: Robot,
     loop: bool = False,
     avoid: bool = False,
     obstacles: tuple[Obstacle, ...] = (),
-) -> Plan | None:
-    """The motion of a program; None: there is none.
+) -> Plan:
+    """The motion of a program.
 
     Args:
         loop: whether it returns to the start.
         avoid: whether a motion that touches something is refused; otherwise `Plan.touch` says where it does.
     """
-    if program is None:
-        return None
     motion = kin.plan_motion(
         robot,
         looped(program) if loop else program,
@@ -179,6 +197,13 @@ def plan(
         near = surroundings(robot, obstacles, bool(robot.capsules))
         touch = checked(motion.driven, near, lambda: None).refusal
     return Plan(program.segments, motion, touch)
+
+
+def tool_path(motion: Motion) -> tuple[Array, Array]:
+    """Poses ``(k, 4, 4)`` of the tool along a motion, and its speed there."""
+    count = int(min(max(2.0, motion.duration / FINEST), MOST_SAMPLES))
+    sample = motion.sample(np.linspace(0.0, motion.duration, count))
+    return sample.T, sample.tool_speed
 
 
 def start(program: Program) -> Array:
@@ -231,23 +256,24 @@ class Fault:
     way_helps: bool = False
 
 
-def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
-    """The planner's refusal, or a locked joint that would have to move; None: nothing."""
-    if plan is None:
-        return None
+@lru_cache(KEPT)
+def find_fault(plan: Plan, locked: Sequence[float | None], units: Units) -> Fault | None:
+    """The planner's refusal, or a locked joint that would have to move; None: nothing.
+
+    Args:
+        locked: the values at which joints are locked, or None; empty: none is.
+    """
     if plan.motion.refusal is not None:
-        return _refused(plan, plan.motion.refusal, stage.units)
-    locked = stage.now.options.constraints.locks(stage.now.robot) or ()
-    for index, row in enumerate(plan.q):
-        for q in row:
-            for joint, value in enumerate(locked):
-                if value is not None and abs(q[joint] - value) > SAME:
-                    unit = stage.units.of(bool(stage.now.robot.revolute[joint]))
-                    words = (
-                        f"Joint {joint + 1} is locked at {unit.text(value)}, and this waypoint has it at "
-                        f"{unit.text(float(q[joint]))}. Unlock the joint, or set the waypoint to another pose."
-                    )
-                    return Fault(index, words, whole=True)
+        return _refused(plan, plan.motion.refusal, units)
+    for index, q in ((index, q) for index, row in enumerate(plan.q) for q in row):
+        for joint, value in enumerate(locked):
+            if value is not None and abs(q[joint] - value) > SAME:
+                unit = units.of(bool(plan.motion.robot.revolute[joint]))
+                words = (
+                    f"Joint {joint + 1} is locked at {unit.text(value)}, and this waypoint has it at "
+                    f"{unit.text(float(q[joint]))}. Unlock the joint, or set the waypoint to another pose."
+                )
+                return Fault(index, words, whole=True)
     return _moved(plan, plan.motion, locked)
 
 

@@ -23,11 +23,14 @@ SAMPLES = 240
 NAMES = ("Position", "Velocity", "Acceleration")
 
 
-def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | None = None) -> str:
+def plot_html(motion: Motion | None, joint: int | None, units: Units, other: Motion | None = None) -> str:
     """The plots of a motion that takes time, of one joint or all (None), and the buttons that choose the joint.
 
     `other`: a motion of the same arm to compare it with.
     """
+    if motion is None:
+        return ""
+    other = other if other is not None and other.planned and other.duration > 0.0 else None
     both = [each for each in (other, motion) if each is not None]
     curves = [curve for each in both for curve in _curves(each, joint, units, each is other)]
     words = "all joints in percent of their limits" if joint is None else f"joint {joint + 1}"

@@ -6,19 +6,16 @@ the waypoint before takes the joint values from which this posture leads farthes
 
 from __future__ import annotations
 
-import threading
-from concurrent.futures import CancelledError
-from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 import kin
 from app.exports.svg import Axes, AxisStyle, Plot, Series, chart
-from app.viewer.arm import Arm
+from app.shared.computations import SharedComputation
 from app.viewer.panel.posture import short
-from app.viewer.tabs.program.plan import Plan
-from app.viewer.tabs.program.program import Segments
+from app.viewer.tabs.program.plan import Asked
 from app.viewer.views.templates import render
 from kin import IKOptions
 from kin.motion.planning.plan import task_of
@@ -40,66 +37,35 @@ LEGEND: dict[State, str] = {
 }
 
 
-@dataclass
-class Chart:
-    """The chart of one waypoint: being computed, done, or failed.
-
-    Attributes:
-        index: of the row.
-        plan, arm: of the program and the arm for which it is computed.
-        found: the postures; None: not known yet.
-        words: why there is no chart.
-        cancelled: set when it is not wanted any more.
-    """
-
-    index: int
-    plan: Plan
-    arm: Arm
-    found: PathPostures | None = None
-    words: str = ""
-    cancelled: threading.Event = field(default_factory=threading.Event)
-
-    def check(self) -> None:
-        """Raise `CancelledError` if it is not wanted any more."""
-        if self.cancelled.is_set():
-            raise CancelledError
-
-    def fits(self, segments: Segments, arm: Arm) -> bool:
-        """Whether the program and what the arm avoids are unchanged since this computation began."""
-        mine = self.arm
-        avoided = (arm.avoid, arm.obstacles) == (mine.avoid, mine.obstacles)
-        return segments == self.plan.segments and arm.robot == mine.robot and avoided
-
-
-def compute(chart: Chart) -> None:
-    """Fill a chart; in a background thread."""
-    plan, avoid = chart.plan, chart.arm.avoid
-    poses = segment_poses(plan.motion, chart.index, PLACES)
-    before = plan.motion.q_before(chart.index)
+def compute(computation: SharedComputation[Any], asked: Asked) -> PathPostures | str:
+    """The postures along the way to a row; or why there is no chart."""
+    plan, arm = asked.plan, asked.arm
+    poses = segment_poses(plan.motion, asked.index, PLACES)
+    before = plan.motion.q_before(asked.index)
     if poses is None or before is None:
-        chart.words = "There is no way to show: the program ends before this waypoint, or it has no length."
-        return
+        return "There is no way to show: the program ends before this waypoint, or it has no length."
     options = IKOptions(
         task=task_of(plan.motion.program, plan.motion.robot),
-        avoid_self_collision=avoid,
-        obstacles=chart.arm.obstacles if avoid else (),
+        avoid_self_collision=arm.avoid,
+        obstacles=arm.obstacles if arm.avoid else (),
     )
-    chart.found = kin.path.path_postures(
-        plan.motion.robot, poses, options=options, q_start=before, cancel=chart.check
-    )
+    cancel = computation.check
+    return kin.path.path_postures(plan.motion.robot, poses, options=options, q_start=before, cancel=cancel)
 
 
-def html(shown: Chart, units: Units) -> str:
+def html(asked: Asked | None, result: PathPostures | str | None, units: Units) -> str:
     """The chart, or that it is being computed."""
-    found = shown.found
+    if asked is None:
+        return ""
+    found = result if isinstance(result, PathPostures) else None
     rows = [] if found is None else [_row(found, row, units) for row in range(len(found.postures))]
     used = set() if found is None else {STATES[state] for state in np.unique(found.states).tolist()}
     return render(
         "program/postures",
-        index=shown.index,
-        words=shown.words if found is None else _words(found),
-        computing=found is None and not shown.words,
-        svg="" if found is None else _svg(found, shown.index, units),
+        index=asked.index,
+        words=result if found is None else _words(found),
+        computing=result is None,
+        svg="" if found is None else _svg(found, asked.index, units),
         rows=rows,
         legend=[(state.replace(" ", "-"), words) for state, words in LEGEND.items() if state in used],
     )

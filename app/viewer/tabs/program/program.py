@@ -6,7 +6,7 @@ points are poses, as it is a curve of the tool, unless a file has configurations
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -224,9 +224,9 @@ def _held(program: Program) -> Program:
     return replace(program, name=clean(program.name, NAME), segments=segments)
 
 
-def pack(program: Program) -> dict[str, object]:
-    """A program as JSON for a link."""
-    return program_to_dict(program)
+def packed(programs: Mapping[str, Program]) -> dict[str, object]:
+    """Programs as JSON for a link."""
+    return {key: program_to_dict(program) for key, program in programs.items()}
 
 
 def unpack(value: object, robot: Robot) -> Program | None:

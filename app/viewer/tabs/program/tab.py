@@ -1,473 +1,530 @@
 """The tab *Program*: waypoints recorded from the arm, planned as one motion, played and plotted.
 
-Every change plans the motion anew. Playing samples it at the rate at which moving arms are shown; it ends when the
-visitor moves the arm. ``static/program.js`` sends what is pressed and typed.
+Playing samples the motion at the rate at which moving arms are shown; it ends when the visitor moves the arm.
+``static/program.js`` sends what is pressed and typed, and shows the time.
 """
 
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable, Hashable, Sequence
+import math
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
 
 import kin
-from app.exports.motion_snippets import SNIPPETS
+import kin.way
 from app.exports.program_toml import toml_of
 from app.exports.snippets import named
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.panel import Html, Node
+from app.viewer.declared.scene import Lazy
+from app.viewer.declared.work import Sweep, Work, in_background
 from app.viewer.own_arm import KEY
 from app.viewer.panel.status import Notice
+from app.viewer.scene.camera import Sphere, round_points
+from app.viewer.tabs.program import postures, scene, views, ways
 from app.viewer.tabs.program import program as rows
-from app.viewer.tabs.program import views
-from app.viewer.tabs.program.compare import CHOICES
-from app.viewer.tabs.program.drawing import Shown
 from app.viewer.tabs.program.files import motion_file, read
-from app.viewer.tabs.program.plan import find_fault
-from app.viewer.tabs.program.playback import RATES
-from app.viewer.tabs.program.postures import Chart, compute
-from app.viewer.tabs.program.program import MOST, PAUSE, Segments, recorded, replaced
-from app.viewer.tabs.program.screen import Screen
-from app.viewer.tabs.workspace.background import run_in_background
+from app.viewer.tabs.program.plan import Asked
+from app.viewer.tabs.program.plot import plot_html
+from app.viewer.tabs.program.program import MOST, PAUSE, Segments, recorded, replaced, targets
+from app.viewer.tabs.program.settings import ProgramFacts, ProgramSettings
+from app.viewer.tabs.program.typed import Fields
 from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
 from kin.motion import Circ, Dwell, Program, Ptp, Spline
 from kin.motion.program import Kind, Segment, Target
+from kin.path import PathPostures
 from kin.transforms import Array
 from kin.typed import EntryError
 from kin.warmup import MOTIONS
 
 REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again
+REPORT = 0.1  # s between two looks at the progress of a search
 LINK = 7000  # bytes of all programs in a link
-_LABELS = {
-    "record": "Record a pose", "pause": "Add a pause", "set": "Set to this pose", "duplicate": "Duplicate",
-    "up": "Move up", "down": "Move down", "delete": "Delete", "go": "Go to", "scrub": "Time of the program",
-    "clear": "Clear the program", "upload": "Open a program", "loop": "Loop", "field": "Waypoint",
-    "via": "Via point", "ptp": "PTP instead", "take": "Joints of arrival", "add-point": "Add a point",
-    "shift-point": "Move a point", "delete-point": "Delete a point", "start": "Start in another posture",
-    "begin": "Start in another posture", "searched": "Find a way",
+USUAL = ProgramSettings().state()  # a link holds what is different
+CHOICES = ("loop", "rate", "path", "ghosts", "frames", "compare", "language")  # settings that the page sends
+# What undo calls a change of a row, and of the program; "": the title of the tab.
+ROWS = {
+    "choose": "", "field": "Waypoint", "go": "Go to", "set": "Set to this pose", "via": "Via point",
+    "ptp": "PTP instead", "take": "Joints of arrival", "start": "Start in another posture",
+    "begin": "Start in another posture", "postures": "", "way": "", "duplicate": "Duplicate", "up": "Move up",
+    "down": "Move down", "delete": "Delete", "point": "", "add-point": "Add a point",
+    "shift-point": "Move a point", "delete-point": "Delete a point",
+}  # fmt: skip
+ACTS = {
+    "record": "Record a pose", "pause": "Add a pause", "clear": "Clear the program", "play": "",
+    "scrub": "Time of the program", "joint": "", "zone": "", "download": "", "save": "", "page": "",
+    "upload": "Open a program", "close-postures": "", "search": "", "way-seconds": "", "way-seed": "",
+    "close-way": "", **dict.fromkeys(CHOICES, ""), "loop": "Loop",
 }  # fmt: skip
 
 
-class ProgramTab(Screen):
+class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
     """What a visitor, or a connected program, does with the programs."""
 
     key = "program"
     title = "Program"
     shared = True
     kernels = (MOTIONS,)
+    settings_of, facts_of = ProgramSettings, ProgramFacts
+    messages = frozenset({*ROWS, *ACTS})
+    undo: ClassVar[dict[str, str]] = {"on_way": "Find a way"}
 
-    def handle(self, key: Hashable, value: object) -> None:
-        match key:
-            case (str(name), int(index), *_) if name in _ROW_HANDLERS and 0 <= index < len(self._segments):
-                _ROW_HANDLERS[name](self, index, value)
-            case (str(name), int(), *_) if name in _ROW_HANDLERS:
-                pass  # the row was deleted since
-            case (str(name), *_) if name in _HANDLERS:
-                _HANDLERS[name](self, value)
-            case _:
-                raise InputError("program", key, "the key of a button or a field")
+    # Declared
 
-    def step_name(self, key: Hashable) -> str:
-        return _LABELS.get(str(key[0]), self.title) if isinstance(key, tuple) else self.title
+    def panel(self) -> Sequence[Node]:
+        f, s, units = self.read, self.settings, self.stage.units
+        opened, search = (f.chosen, f.point), (s.seconds, s.seed)
+        frame = self._fields.frame
+        found = f.work("way") if s.search else None
+        return [
+            Html(views.player, (f.plan, f.playable, s.rate, s.loop, s.shown, units)),
+            Html(views.clock, (f.time, f.duration, s.playing, f.here)),
+            Html(
+                views.list_html,
+                (f.plan, opened, f.fault, s.loop, f.robot, units, frame, f.arm.task, s.by_pose, s.revision),
+            ),
+            Html(postures.html, (f.chart, f.work("postures").value, units)),
+            Html(ways.html, (f.way, found, search, units)),
+            Html(plot_html, (f.lasting, s.joint, units, f.other)),
+            Html(views.summary, (f.plan, s.own, units)),
+            Html(views.comparison, (f.whole, f.other, s.compare, s.zone, units)),
+            Html(views.files, (f.motion, bool(f.segments), s.own, self.stage.service, s.language)),
+        ]
+
+    def scene(self) -> Sequence[Lazy]:
+        f, shown = self.facts, self.settings.shown
+        if f.plan is None or not shown.path:
+            return ()
+        return [Lazy("drawing", scene.nodes, (f.plan, f.fault, shown, f.other))]
+
+    def running(self) -> Sequence[Work | Sweep]:
+        f, s = self.facts, self.settings
+        found: list[Work | Sweep] = []
+        if f.segments:
+            found.append(Work("obstacles", tuple, (f.arm.obstacles,), rest=REPLAN, keep=True))
+        if f.chart is not None:
+            found.append(Work("postures", in_background(postures.compute), (f.chart,)))
+        if f.way is not None and s.search:
+            args = f.way, s.seconds, s.seed, s.search
+            found.append(Work("way", in_background(ways.search), args, poll=REPORT))
+        if s.playing:
+            found.append(Sweep(self._play_on, self.stage.frame, math.inf))
+        return found
+
+    def worked(self, key: str) -> None:
+        if self.facts.work(key).error is not None:
+            self.change(chart=None, search=0)
+        if isinstance(self.facts.work(key).value, ways.Found):
+            self.post(("do", self.event(self.on_way), 0, 0))  # a step that can be undone
+        super().worked(key)
+
+    def started(self) -> None:
+        own = self.stage.own
+        self.change(own=own is not None and own.robot == self.stage.now.robot)
+
+    @property
+    def failure(self) -> str:
+        return "" if self.facts.fault is None else "the program cannot be driven to its end"
+
+    def extents(self) -> Sequence[Sphere]:
+        plan = self.facts.plan
+        if plan is None or not self.settings.path:
+            return []
+        points = kin.fk(plan.motion.robot, plan.waypoints)[:, :3, 3]
+        return [round_points(np.vstack([points, plan.path[0][:, :3, 3]]))]
+
+    def state(self) -> dict[str, object]:
+        changed = {name: value for name, value in super().state().items() if value != USUAL[name]}
+        return {"programs": rows.packed(self.settings.programs or {}), **changed}
+
+    def restore(self, state: dict[str, object]) -> None:
+        robots = {robot.id: robot for robot in self.stage.store.robots}
+        if self.stage.own is not None:
+            robots[KEY] = self.stage.own.robot
+        given = state.get("programs")
+        items = given.items() if isinstance(given, dict) else ()
+        read = {key: rows.unpack(value, robots[key]) for key, value in items if key in robots}
+        self._stop()
+        self.change(programs={key: program for key, program in read.items() if program is not None})
+        super().restore(USUAL | state)
+
+    def on_robot(self) -> None:
+        self._stop()
+        super().on_robot()
+
+    def remove(self) -> None:
+        self._stop()
+        super().remove()
 
     # What a connected program does
 
     def load(self, program: Program, name: str) -> None:
         """Take a program in place of the one on show; raises `InputError`, and nothing has changed then."""
-        arm = self.stage.now
-        program = rows.opened(program, arm.robot, arm.goal)
-        self._use(program.segments, None, program)
-        if self._segments != program.segments:
+        if not self._open_program(program, f"A program from {name}"):
             expected = "programs of all arms that fit into a link"
             raise InputError("program", rows.counted(program.segments), expected)
-        if self._fault is None:
-            self.stage.notify(Notice("hand", f"A program from {name}", rows.counted(program.segments)))
 
     def start(self, on: bool) -> None:
         """Play from the beginning, or stop; raises `InputError` if nothing can be played."""
-        self._playback.stop()
-        if not on:
-            return
-        self._player.time = 0.0
-        self._play(None)
-        if not self._player.playing:
-            words = "no program" if self._fault is None else self._fault.words
+        self._stop()
+        self.schedule()
+        self.invalidate()
+        f = self.facts
+        if on and f.playable is None:
+            words = "no program" if f.fault is None else f.fault.words
             raise InputError("play", words, "a program of at least two poses that can be driven")
+        if on:
+            self._play(0.0)
 
     @property
     def progress(self) -> dict[str, object]:
-        """Whether a program plays, and where it is; the same object while that is the same."""
-        found: dict[str, object] = {
-            "items": rows.places(self._segments),
-            "playing": self._player.playing,
-            "time": self._player.time,
-            "duration": self._playback.duration,
-            "complete": self._fault is None and self._whole is not None,
-        }
-        if found != self._progress:
-            self._progress = found
-        return self._progress
+        """See `ProgramFacts`."""
+        self.invalidate()
+        return self.facts.progress
 
-    # Reports of the session
+    # Events
 
-    @property
-    def failure(self) -> str:
-        return "" if self._fault is None else "the program cannot be driven to its end"
+    def heard(self, key: Hashable, value: object) -> None:
+        match key:
+            case (str(name), int(index), *_) if name in ROWS:
+                if 0 <= index < len(self.facts.segments):  # otherwise the row was deleted since
+                    self._act_on_row(name, index, value)
+            case (str(name), *_) if name in CHOICES:
+                value = float(value) if type(value) is int else value
+                self.change(**{name: self.spec(name).unpack(name, value, self.facts.robot)})
+                if name == "loop":
+                    self._stop()
+            case (str(name), *_) if name in ACTS:
+                self._act(name, value)
+            case _:
+                super().heard(key, value)
 
-    def on_robot(self) -> None:
-        self._chosen, self._joint, self._player.time = None, None, 0.0
-        self._playback.stop()
-        self._refresh()
+    def step_name(self, key: Hashable) -> str:
+        label = (ROWS | ACTS).get(str(key[0])) if isinstance(key, tuple) else ""
+        return label or super().step_name(key)
 
-    def on_request(self) -> None:
-        if find_fault(self._plan, self.stage) != self._fault:
-            self._refresh()
+    def _act(self, name: str, value: object) -> None:
+        f, s, here = self.facts, self.settings, self.stage.now.goal
+        match name:
+            case "record":
+                self._insert(len(f.segments), Ptp(recorded(here)), chosen=None)
+            case "pause":  # behind the open row, else at the end
+                at = len(f.segments) if f.chosen is None else f.chosen + 1
+                self._insert(at, Dwell(PAUSE), at)
+            case "clear":
+                self._use(())
+            case "play" if s.playing:
+                self._stop()
+            case "play" if f.playable is not None:
+                self._play(0.0 if f.time >= f.duration else f.time)
+            case "play":
+                words = "Record at least two poses." if f.fault is None else f.fault.words
+                self._refuse("The program cannot be played", words)
+            case "scrub":
+                self._scrub(value)
+            case "joint":
+                self.change(joint=index_of(value, f.robot.n))
+            case "zone" | "way-seconds" | "way-seed":
+                self._type_setting(name.removeprefix("way-"), value)
+            case "download":
+                self._download()
+            case "save":
+                self._save(value)
+            case "page":
+                send_page(self.stage, f.motion)
+            case "upload":
+                self._upload(value)
+            case "close-postures":
+                self.change(chart=None)
+            case "search":
+                if f.way is not None and not f.searches and kin.way.is_installed():
+                    self.change(way=self._asked(f.way.index), search=s.search + 1)
+            case "close-way":  # a search is cancelled, back to its form
+                self.change(way=f.way if f.searches else None, search=0)
 
-    def on_style(self) -> None:
-        self._refresh()
+    def _act_on_row(self, name: str, index: int, value: object) -> None:
+        f, row = self.facts, self.facts.segments[index]
+        match name:
+            case "choose":
+                self._open(None if index == f.chosen else index)
+            case "field":
+                self._type(index, value)
+            case "go":
+                self._go_to_row(index)
+            case "set":
+                self._open(index)
+                self._set_target(index, self.stage.now.goal, min(self.settings.point, len(targets(row)) - 1))
+            case "via" if isinstance(row, Circ):
+                self._put(index, replace(row, via=rows.point(self.stage.now.T_goal[:3, 3])))
+            case "ptp":
+                self._set_kind(index, "ptp")
+            case "take" if f.plan is not None and (arrival := f.plan.arrives_otherwise(index)) is not None:
+                self._set_target(index, arrival.q)
+            case "start" | "begin":
+                self._arrive(name, index, value)
+            case "postures":
+                self.change(chart=self._asked(index))
+            case "way":
+                plan = f.plan
+                can = plan is not None and plan.can_have_way(index)
+                self.change(way=self._asked(index) if can else None, search=0)
+            case "duplicate":
+                self._insert(index + 1, row, index + 1)
+            case "up" | "down":
+                to = index - 1 if name == "up" else index + 1
+                if 0 <= to < len(f.segments):
+                    self._use(rows.moved(f.segments, index, to), to)
+            case "delete":
+                found = replaced(f.segments, index)
+                self._use(found, min(index, len(found) - 1) if found else None)
+            case _ if isinstance(row, Spline) and index == f.chosen:
+                self._change_points(name, index, row, value)
 
-    def on_obstacles(self) -> None:
-        if self._segments:
-            self._stale, self.due = time.perf_counter() + REPLAN, REPLAN
+    def _asked(self, index: int) -> Asked | None:
+        plan = self.facts.plan
+        return None if plan is None else Asked(index, plan, self.stage.now)
 
-    def tick(self, now: float) -> None:
-        if self._stale is not None and now >= self._stale:
-            self._refresh()
-        self.due = self._playback.tick(now)
-        if self._stale is not None:
-            self.due = min(self.due or REPLAN, REPLAN)
-
-    def state(self) -> dict[str, object]:
-        usual = {"loop": False, "rate": 1.0, "path": True, "ghosts": False, "frames": False, "compare": None}
-        now = {
-            "loop": self._player.loop, "rate": self._player.rate, "path": self._shown.path,
-            "ghosts": self._shown.ghosts, "frames": self._shown.frames, "compare": self._compared,
-        }  # fmt: skip
-        programs = {key: rows.pack(program) for key, program in self._programs.items()}
-        return {"programs": programs} | {key: value for key, value in now.items() if value != usual[key]}
-
-    def restore(self, state: dict[str, object]) -> None:
-        programs = state.get("programs")
-        robots = {robot.id: robot for robot in self.stage.store.robots}
-        if self.stage.own is not None:
-            robots[KEY] = self.stage.own.robot
-        given = programs.items() if isinstance(programs, dict) else ()
-        read = {key: rows.unpack(value, robots[key]) for key, value in given if key in robots}
-        self._programs = {key: program for key, program in read.items() if program is not None}
-        rate, compared = state.get("rate", 1.0), state.get("compare")
-        self._player.loop = state.get("loop") is True
-        self._player.rate = next((each for each in RATES if each == rate), 1.0)
-        self._compared = next((each for each in CHOICES if each == compared), None)
-        ghosts, frames = (state.get(each) is True for each in ("ghosts", "frames"))
-        self._shown = Shown(state.get("path") is not False, ghosts, frames)
-        self._playback.stop()
-        self._refresh()
-
-    def on_leave(self) -> None:
-        self._ways.cancel()
-        if self._chart is not None:
-            self._chart.cancelled.set()
-
-    def remove(self) -> None:
-        self.on_leave()
-        self._playback.stop()
-        self._erase()
+    def _refuse(self, title: str, detail: str) -> None:
+        """Say why a change is not made; fields show what is true again."""
+        self.change(revision=self.settings.revision + 1)
+        self.stage.notify(Notice("error", title, detail))
 
     # The program
 
-    def _use(self, segments: Segments, chosen: int | None, program: Program | None = None) -> None:
-        """Take other rows, with this one open; `program`: with the other fields of this program."""
-        arm = self.stage.now
-        segments, count = rows.begun(segments, arm.robot, arm.goal), rows.places(self._segments)
-        programs = {key: value for key, value in self._programs.items() if key != self._key}
+    def _use(self, segments: Segments, chosen: int | None = None, program: Program | None = None) -> bool:
+        """Take other rows, with this one open; `program`: with the other fields of this program.
+
+        Returns whether there was room for them.
+        """
+        f = self.facts
+        segments, count = rows.begun(segments, f.robot, self.stage.now.goal), rows.places(f.segments)
+        programs = {key: value for key, value in (self.settings.programs or {}).items() if key != f.key}
         if segments:
-            programs[self._key] = replace(program or self._program or Program(segments), segments=segments)
-        packed = json.dumps({key: rows.pack(value) for key, value in programs.items()}, ensure_ascii=False)
+            programs[f.key] = replace(program or f.program or Program(segments), segments=segments)
+        size = len(json.dumps(rows.packed(programs), ensure_ascii=False).encode())
         if rows.places(segments) > max(count, MOST):
             self._refuse("The program is full", f"It may have {MOST} waypoints and pauses.")
-        elif rows.places(segments) > count and len(packed.encode()) > LINK:
+        elif rows.places(segments) > count and size > LINK:
             self._refuse("The link is full", "Delete waypoints, or save the program as a file and clear it.")
         else:
-            self._programs = programs
+            self._stop()
+            self.change(programs=programs)
             self._open(chosen)
-            self._playback.stop()
-            self._refresh()
+            self.invalidate()
             self._say_fault()
+            return True
+        return False
+
+    def _open_program(self, program: Program, title: str) -> bool:
+        """Take a program from elsewhere, and say so; returns whether there was room for it."""
+        self.schedule()
+        self.invalidate()
+        program = rows.opened(program, self.facts.robot, self.stage.now.goal)
+        taken = self._use(program.segments, None, program)
+        if taken and self.facts.fault is None:
+            self.stage.notify(Notice("hand", title, rows.counted(program.segments)))
+        return taken
 
     def _open(self, index: int | None) -> None:
         """Open a row, and the last point of a spline that was not open."""
-        if index != self._chosen:
-            self._point = MOST
-        self._chosen = index if index is not None and index < len(self._segments) else None
+        if index != self.settings.chosen:
+            self.change(chosen=index, point=MOST)
 
     def _say_fault(self) -> None:
         """Say in the status card where the program ends, if it cannot be driven to its end."""
-        if self._fault is None:
+        f = self.facts
+        if f.fault is None:
             return
-        index, count = self._fault.index, len(self._segments)
+        index, count = f.fault.index, len(f.segments)
         where = "on the way back to the start" if index >= count else f"on the way to {index + 1} of {count}"
-        if index == rows.start_of(self._segments):
+        if index == rows.start_of(f.segments):
             where = "at its start"
-        self.stage.notify(Notice("error", f"The program ends {where}", self._fault.words))
+        self.stage.notify(Notice("error", f"The program ends {where}", f.fault.words))
 
     # Changes of the rows
 
     def _put(self, index: int, *new: Segment) -> None:
         """Put rows in the place of one, which stays open."""
-        self._use(replaced(self._segments, index, *new), self._chosen)
+        self._use(replaced(self.facts.segments, index, *new), self.settings.chosen)
 
-    def _insert(self, index: int, row: Segment, choose: bool = True) -> None:
-        found = self._segments
-        self._use((*found[:index], row, *found[index:]), index if choose else None)
-
-    def _record(self, _: object) -> None:
-        self._insert(len(self._segments), Ptp(recorded(self.stage.now.goal)), choose=False)
-
-    def _pause(self, _: object) -> None:
-        """Add a pause behind the open row, else at the end."""
-        self._insert(len(self._segments) if self._chosen is None else self._chosen + 1, Dwell(PAUSE))
-
-    def _choose(self, index: int, _: object) -> None:
-        self._open(None if index == self._chosen else index)
-        self._show_list()
+    def _insert(self, index: int, row: Segment, chosen: int | None) -> None:
+        found = self.facts.segments
+        self._use((*found[:index], row, *found[index:]), chosen)
 
     def _set_target(self, index: int, q: Array, point: int = -1) -> None:
         """Give a row, or a point of a spline, these joint values ``(n,)``."""
-        row = self._segments[index]
+        row = self.facts.segments[index]
         if not isinstance(row, Dwell):
-            self._put(index, rows.with_target(row, point, recorded(q), self.stage.now.robot))
-
-    def _set_pose(self, index: int, _: object) -> None:
-        self._open(index)
-        self._set_target(
-            index, self.stage.now.goal, min(self._point, len(rows.targets(self._segments[index])) - 1)
-        )
-
-    def _set_via(self, index: int, _: object) -> None:
-        if isinstance(row := self._segments[index], Circ):
-            self._put(index, replace(row, via=rows.point(self.stage.now.T_goal[:3, 3])))
-
-    def _move(self, index: int, to: int) -> None:
-        if 0 <= to < len(self._segments):
-            self._use(rows.moved(self._segments, index, to), to)
-
-    def _delete(self, index: int, _: object) -> None:
-        found = replaced(self._segments, index)
-        self._use(found, min(index, len(found) - 1) if found else None)
+            self._put(index, rows.with_target(row, point, recorded(q), self.facts.robot))
 
     def _set_kind(self, index: int, kind: Kind, opens: bool = False) -> None:
         """Make a row one of another kind, or a row for each point of a spline; `opens`: it is open then."""
-        found = self._plan
-        if found is None or not found.q[index] or kind == "dwell":
+        f = self.facts
+        if f.plan is None or not f.plan.q[index]:
             return
-        before = found.before(index)
-        start = found.q[index][0] if before is None else found.q[before][-1]
-        segments, at = rows.as_kind(self._segments, index, kind, found.q[index], start, self.stage.now.robot)
-        self._use(segments, at if opens or self._chosen == index else self._chosen)
+        before = f.plan.before(index)
+        start = f.plan.q[index][0] if before is None else f.plan.q[before][-1]
+        segments, at = rows.as_kind(f.segments, index, kind, f.plan.q[index], start, f.robot)
+        self._use(segments, at if opens or f.chosen == index else f.chosen)
 
-    # Points of a spline
+    def _change_points(self, name: str, index: int, row: Spline, value: object) -> None:
+        """Choose, add, move or delete a point of the open spline."""
+        points, at = list[Target](row.points), self.facts.point
+        match name:
+            case "point":
+                found = index_of(value, len(points))
+                self.change(point=at if found is None else found, revision=self.settings.revision + 1)
+                return
+            case "add-point":
+                at += 1
+                points.insert(at, rows.as_point(row, recorded(self.stage.now.goal), self.facts.robot))
+            case "delete-point" if len(points) > 1:
+                points.pop(at)
+                at = max(at - 1, 0)
+            case "shift-point" if 0 <= (to := at + (1 if value == "1" else -1)) < len(points):
+                points.insert(to, points.pop(at))
+                at = to
+            case _:
+                return
+        self.change(point=at)
+        self._put(index, replace(row, points=tuple(points)))
 
-    def _use_points(self, index: int, change: Callable[[Spline], tuple[Sequence[Target], int]]) -> None:
-        """Change the points of the open spline; `change` returns them, and which one is open then."""
-        if isinstance(row := self._segments[index], Spline) and index == self._chosen:
-            points, point = change(row)
-            if points:
-                self._point = point
-                self._put(index, replace(row, points=tuple(points)))
-
-    def _choose_point(self, index: int, text: object) -> None:
-        found = index_of(text, len(rows.targets(self._segments[index])))
-        if found is not None and index == self._chosen:
-            self._point = found
-            self._show_list(anew=True)
-
-    def _add_point(self, index: int, _: object) -> None:
-        def change(row: Spline) -> tuple[Sequence[Target], int]:
-            here, at = rows.as_point(row, recorded(self.stage.now.goal), self.stage.now.robot), self._point + 1
-            return [*row.points[:at], here, *row.points[at:]], at
-
-        self._use_points(index, change)
-
-    def _delete_point(self, index: int, _: object) -> None:
-        at = self._point
-        self._use_points(index, lambda row: ([*row.points[:at], *row.points[at + 1 :]], max(at - 1, 0)))
-
-    def _shift_point(self, index: int, step: object) -> None:
-        def change(row: Spline) -> tuple[Sequence[Target], int]:
-            points, to = list(row.points), self._point + (1 if step == "1" else -1)
-            if not 0 <= to < len(points):
-                return (), 0
-            points.insert(to, points.pop(self._point))
-            return points, to
-
-        self._use_points(index, change)
-
-    # Arrivals in other joint values than recorded
-
-    def _take(self, index: int, _: object) -> None:
-        """Record the joint values in which the arm arrives at a waypoint."""
-        arrival = None if self._plan is None else self._plan.arrives_otherwise(index)
-        if arrival is not None:
-            self._set_target(index, arrival.q)
-
-    def _start(self, index: int, _: object) -> None:
-        """Change the posture at the waypoint before, so that the arm arrives as recorded."""
-        found = None if self._plan is None else self._plan.start_as_recorded(index)
-        if found is not None:
-            self._set_target(*found)
-
-    # Postures along the way
-
-    def _show_postures(self, index: int, _: object) -> None:
-        """Compute the chart of the way to a waypoint, in the background."""
-        self._close_postures()
-        if self._plan is None:
+    def _arrive(self, name: str, index: int, value: object) -> None:
+        """Change the waypoint before, so that one is met as recorded, or (*begin*) in a posture of the chart."""
+        f = self.facts
+        if f.plan is None:
             return
-        self._chart = chart = Chart(index, self._plan, self.stage.now)
-        self._keep_postures()
+        before, start = f.plan.before(index), f.plan.start_as_recorded(index)
+        q = None if start is None else start[1]
+        if name == "begin":
+            chart = f.work("postures").value
+            if not isinstance(chart, PathPostures) or f.chart is None or f.chart.index != index:
+                return
+            place = index_of(value, len(chart.postures))
+            if place is None or chart.reach[0, place] < 0:
+                return
+            # Of this posture, the whole turns from which it arrives as recorded.
+            if q is None or kin.branch_of(chart.robot, q) != chart.postures[place]:
+                q = chart.q[0, place]
+        if q is not None and before is not None:
+            self._set_target(before, q)
 
-        def work() -> None:
-            compute(chart)
-            self.post(("charted",), chart)
-
-        run_in_background(work, "postures", lambda key, value: self.post((key,), value))
-
-    def _charted(self, chart: object) -> None:
-        if chart is self._chart:
-            self._keep_postures()
-
-    def _failed(self, error: object) -> None:
-        self._close_postures()
-        self._ways.close()
-        if isinstance(error, BaseException):
-            raise error
-
-    def _begin(self, index: int, row: object) -> None:
-        """Start in a posture of the chart: the waypoint before takes its joint values."""
-        chart = self._chart
-        found = None if chart is None or chart.index != index else chart.found
-        if self._plan is None or found is None or (place := index_of(row, len(found.postures))) is None:
-            return
-        before = self._plan.before(index)
-        if found.reach[0, place] < 0 or before is None:
-            return
-        q, as_recorded = found.q[0, place], self._plan.start_as_recorded(index)
-        if as_recorded is not None and kin.branch_of(found.robot, as_recorded[1]) == found.postures[place]:
-            q = as_recorded[1]  # of this posture, the whole turns from which it arrives as recorded
-        self._set_target(before, q)
-
-    # A way around obstacles
-
-    def _searched(self, search: object) -> None:
+    def on_way(self) -> None:
         """Put the waypoints of a way into the program."""
-        found = self._ways.ended(search)
-        if found is None or found.found is None:
+        f = self.facts
+        found = f.work("way").value
+        if f.way is None or not isinstance(found, ways.Found):
             return
-        chosen = self._chosen
-        self._use(found.found, chosen if chosen is None or chosen < found.index else chosen + found.count)
-        touch = None if self._plan is None or self._plan.touch is None else self._plan.touch.segment
-        touched = touch if self._fault is None else self._fault.index
-        if self._segments == found.found and (touched is None or not found.leads_by(touched)):
+        chosen = f.chosen
+        if chosen is not None and chosen >= found.index:
+            chosen += found.count
+        self.change(way=None, search=0)
+        taken = self._use(found.segments, chosen)
+        f = self.facts
+        touch = None if f.plan is None or f.plan.touch is None else f.plan.touch.segment
+        touched = touch if f.fault is None else f.fault.index
+        if taken and (touched is None or not found.leads_by(touched)):
             self.stage.notify(Notice("hand", *found.said()))
 
     # Fields
 
+    @property
+    def _fields(self) -> Fields:
+        """How values are written and read."""
+        arm, stage = self.stage.now, self.stage
+        return Fields(arm.robot, stage.units, stage.frames.pose(arm.robot, arm.goal), arm.task)
+
     def _type(self, index: int, value: object) -> None:
+        f = self.facts
         match value:
             case ["kind", str(kind)] if kind in views.KINDS:
                 self._set_kind(index, next(each for each in views.KINDS if each == kind), opens=True)
             case ["values", ("joints" | "pose") as shown]:
-                self._by_pose = shown == "pose"
-                self._show_list()
+                self.change(by_pose=shown == "pose")
             case [str(field), text]:
-                q = () if self._plan is None else self._plan.q[index]
-                point = self._point if index == self._chosen else 0
+                q = () if f.plan is None else f.plan.q[index]
+                point = f.point if index == f.chosen else 0
                 try:
-                    row = self._fields.read(field, text, self._segments[index], q, min(point, len(q) - 1))
+                    row = self._fields.read(field, text, f.segments[index], q, min(point, len(q) - 1))
                 except EntryError as error:
                     self._refuse(error.title, error.detail)
                     return
-                self._use(replaced(self._segments, index, row), index)
-                self._show_list(anew=True)
+                self._use(replaced(f.segments, index, row), index)
+                self.change(revision=self.settings.revision + 1)
             case _:
                 raise InputError("field", value, "the name of a field, and a text")
 
-    def _refuse(self, title: str, detail: str) -> None:
-        self._show_list(anew=True)
-        self.stage.notify(Notice("error", title, detail))
+    def _type_setting(self, name: str, text: object) -> None:
+        """The radius of zones to compare with, or a limit of a search."""
+        if not isinstance(text, str):
+            raise InputError(name, text, "a text")
+        try:
+            self.change(**{name: self._fields.blend(text) if name == "zone" else ways.read_setting(name, text)})
+        except EntryError as error:
+            self._refuse(error.title, error.detail)
 
     # Playing
 
-    def _play(self, _: object) -> None:
-        if self._player.playing:
-            self._playback.stop()
-            return
-        self._fault = find_fault(self._plan, self.stage)
-        if self._motion is None or self._motion.duration == 0.0 or self._blocked:
-            words = "Record at least two poses." if self._fault is None else self._fault.words
-            self._refuse("The program cannot be played", words)
-            return
-        self._playback.play()
-        self.due = 0.0
+    def _play(self, time: float) -> None:
+        """Go on from a time; the arm first comes to where the motion is."""
+        self.change(playing=True, leads=True)
+        self._go(time, ease=True)
+        self.stage.play(True)
+
+    def _stop(self) -> None:
+        """Leave the arm where it is."""
+        if self.settings.playing:
+            self.change(playing=False)
+            self.stage.play(False)
+
+    def _play_on(self, seconds: float) -> None:
+        """Show the next frame."""
+        f, s, now = self.facts, self.settings, self.stage.now
+        if f.playable is None or s.sent is None or not np.array_equal(s.sent, now.goal):
+            self._stop()  # the visitor has moved the arm, or changed the program
+        elif s.leads:
+            self.change(leads=not np.array_equal(now.q, now.goal))
+        elif (time := f.after(seconds)) is not None:
+            self._go(time)
+        else:
+            assert f.plan is not None
+            self._go(f.duration, views.ended(f.plan, s.rate, self.stage.units))
+            self._stop()
+
+    def _go(self, time: float, notice: Notice | None = None, ease: bool = False) -> None:
+        """Move the arm to where the motion is at a time; `notice`: by default which row is driven."""
+        f = self.facts
+        assert f.motion is not None
+        assert f.plan is not None
+        q = f.robot.clip(f.motion.derivatives(time)[0])
+        self.change(time=time, sent=q)
+        self.stage.move_to(q, notice or views.playing(f.plan, f.plan.row_at(time)), at_once=not ease)
 
     def _scrub(self, time: object) -> None:
         if not isinstance(time, int | float) or isinstance(time, bool) or not 0.0 <= time < 1e9:
             raise InputError("time", time, "seconds, 0 or more")
-        if self._motion is not None and not self._blocked:
-            self._playback.go_to(float(time))
+        f = self.facts
+        if f.motion is not None and not (f.fault is not None and f.fault.whole):
+            self._stop()
+            time = min(float(time), f.duration)
+            self._go(time, Notice("hand", f"The program at {time:.2f} s"))
 
-    def _go_to_row(self, index: int, _: object) -> None:
+    def _go_to_row(self, index: int) -> None:
         """Move the arm to where it is at the end of a row, or at the open point of a spline."""
-        if self._plan is None:
+        f = self.facts
+        if f.plan is None:
             return
-        row = self._segments[index]
-        time, q = self._plan.met(index, self._point if index == self._chosen else MOST)
+        time, q = f.plan.met(index, f.point if index == f.chosen else MOST)
         if time is not None:
-            self._playback.note(time)
-        title = row.name or ("Pause" if isinstance(row, Dwell) else f"Waypoint {index + 1}")
-        self.stage.move_to(self.stage.now.robot.clip(q), Notice("hand", title))
-
-    # Choices
-
-    def _set_rate(self, rate: object) -> None:
-        if rate not in RATES:
-            raise InputError("speed", rate, "one of " + ", ".join(map(str, RATES)))
-        self._player.rate = float(rate)
-        self._show_player()
-
-    def _set_loop(self, on: object) -> None:
-        self._player.loop = bool(on)
-        self._playback.stop()
-        self._refresh()
-
-    def _set_shown(self, name: str, on: object) -> None:
-        self._shown = replace(self._shown, **{name: bool(on)})
-        self._draw()
-        self._show_player()
-
-    def _set_joint(self, text: object) -> None:
-        self._joint = index_of(text, self.stage.now.robot.n)
-        self._show_plot()
-
-    def _compare(self, value: object) -> None:
-        self._compared = next((each for each in CHOICES if each == value), None)
-        self._refresh()
-
-    def _set_zone(self, text: object) -> None:
-        if not isinstance(text, str):
-            raise InputError("zone", text, "a text")
-        try:
-            self._zone = self._fields.blend(text)
-        except EntryError as error:
-            self.stage.notify(Notice("error", error.title, error.detail))
-        self._refresh()
-
-    def _set_language(self, name: object) -> None:
-        if name not in SNIPPETS:
-            raise InputError("language", name, "one of " + ", ".join(SNIPPETS))
-        self._language = str(name)
-        self._show_files()
+            self._stop()
+            self.change(time=time)
+        self.stage.move_to(f.robot.clip(q), Notice("hand", views.title(index, f.segments[index])))
 
     # Files
 
@@ -475,89 +532,32 @@ class ProgramTab(Screen):
         self.stage.client.send_file_download(name, data, save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", words))
 
-    def _download(self, _: object) -> None:
-        if self._plan is None:
+    def _download(self) -> None:
+        f = self.facts
+        if f.plan is None:
             return
-        robot = named(self.stage.now.robot) if self._own else self.stage.now.robot
-        program = replace(self._plan.motion.program, name=robot.name[:100])
+        robot = named(f.robot) if self.settings.own else f.robot
+        program = replace(f.plan.motion.program, name=robot.name[:100])
         data = toml_of(program, robot.name).encode()
         self._send(f"{robot.id}-program.toml", data, "Your browser has put it where it puts downloads.")
 
     def _save(self, name: object) -> None:
         """Download the motion over time, or the part of it that can be driven."""
-        if self._motion is None:
+        f, motion = self.facts, self.facts.motion
+        if motion is None:
             return
-        motion = replace(self._motion, robot=named(self._motion.robot)) if self._own else self._motion
+        motion = replace(motion, robot=named(motion.robot)) if self.settings.own else motion
         try:
             file, data, sampled = motion_file(motion, name)
         except InputError as error:
             self._refuse("The motion was not saved", f"This format is for {error.expected}.")
             return
-        part = "" if self._whole is not None else "Only up to where the program ends. "
+        part = "" if f.whole is not None else "Only up to where the program ends. "
         self._send(file, data, f"{part}{sampled}Radians, metres and seconds.")
 
     def _upload(self, value: object) -> None:
-        arm = self.stage.now
         try:
-            name, program = read(value, arm.robot)
-            program = rows.opened(program, arm.robot, arm.goal)
+            name, program = read(value, self.facts.robot)
+            self._open_program(program, name)
         except KinematicsError as error:
             self._refuse("The file was not used", str(error))
-            return
-        self._use(program.segments, None, program)
-        if self._fault is None and self._segments == program.segments:
-            self.stage.notify(Notice("hand", name, rows.counted(program.segments)))
-
-
-_ROW_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
-    "choose": ProgramTab._choose,
-    "point": ProgramTab._choose_point,
-    "add-point": ProgramTab._add_point,
-    "shift-point": ProgramTab._shift_point,
-    "delete-point": ProgramTab._delete_point,
-    "field": ProgramTab._type,
-    "go": ProgramTab._go_to_row,
-    "set": ProgramTab._set_pose,
-    "via": ProgramTab._set_via,
-    "ptp": lambda tab, index, _: tab._set_kind(index, "ptp"),
-    "take": ProgramTab._take,
-    "postures": ProgramTab._show_postures,
-    "way": lambda tab, index, _: tab._ways.open(tab._plan, index),
-    "begin": ProgramTab._begin,
-    "start": ProgramTab._start,
-    "duplicate": lambda tab, index, _: tab._insert(index + 1, tab._segments[index]),
-    "up": lambda tab, index, _: tab._move(index, index - 1),
-    "down": lambda tab, index, _: tab._move(index, index + 1),
-    "delete": ProgramTab._delete,
-}
-_HANDLERS: dict[str, Callable[[ProgramTab, object], None]] = {
-    "record": ProgramTab._record,
-    "pause": ProgramTab._pause,
-    "clear": lambda tab, _: tab._use((), None),
-    "play": ProgramTab._play,
-    "scrub": ProgramTab._scrub,
-    "rate": ProgramTab._set_rate,
-    "loop": ProgramTab._set_loop,
-    "path": lambda tab, on: tab._set_shown("path", on),
-    "ghosts": lambda tab, on: tab._set_shown("ghosts", on),
-    "frames": lambda tab, on: tab._set_shown("frames", on),
-    "joint": ProgramTab._set_joint,
-    "compare": ProgramTab._compare,
-    "zone": ProgramTab._set_zone,
-    "language": ProgramTab._set_language,
-    "download": ProgramTab._download,
-    "save": ProgramTab._save,
-    "page": lambda tab, _: send_page(tab.stage, tab._motion),
-    "close-postures": lambda tab, _: tab._close_postures(),
-    "charted": ProgramTab._charted,
-    "search": lambda tab, _: tab._ways.start(),
-    "searching": lambda tab, search: tab._ways.report(search),
-    "searched": ProgramTab._searched,
-    "way-seconds": lambda tab, text: tab._ways.type("seconds", text),
-    "way-seed": lambda tab, text: tab._ways.type("seed", text),
-    "close-way": lambda tab, _: tab._ways.close(),
-    "failed": ProgramTab._failed,
-    "upload": ProgramTab._upload,
-}
-_OWN = {"charted", "failed", "searching", "searched"}  # posted by the tab itself, never sent by a page
-ProgramTab.messages = frozenset({*_ROW_HANDLERS, *_HANDLERS} - _OWN)

@@ -7,20 +7,28 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.exports.motion_snippets import SNIPPETS
+from app.exports.snippets import Service
+from app.viewer.live.tape import BYTES
+from app.viewer.panel.share import box_html
+from app.viewer.panel.status import Notice
 from app.viewer.tabs.program.compare import CHOICES, Choice, about, jerk_is_infinite
-from app.viewer.tabs.program.drawing import Shown
+from app.viewer.tabs.program.files import LARGEST, MOTIONS
 from app.viewer.tabs.program.plan import Fault, Plan
-from app.viewer.tabs.program.playback import RATES, Player
 from app.viewer.tabs.program.program import MOST, Segments, places, start_of
+from app.viewer.tabs.program.scene import Shown
+from app.viewer.tabs.program.settings import RATES
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
+from kin import Robot
+from kin.ik import Task
 from kin.motion import Dwell, Motion, MotionLimits, Peak, Spline
 from kin.motion.arrivals import Arrival
 from kin.motion.program import Kind, Segment, kind_of
 from kin.motion.results import Quantity
 from kin.transforms import Array
-from kin.units import Units, fixed
+from kin.units import Units, fixed, general
 
 KINDS: dict[Kind, tuple[str, str]] = {
     "ptp": ("PTP – straight in the joints", "PTP"),
@@ -39,33 +47,45 @@ STATES = (
 )
 
 
-def rate_name(rate: float) -> str:
-    """A factor of the speed as text."""
-    return f"{rate:g}×"
-
-
-def player(
-    player: Player, motion: Motion | None, playable: bool, drawn: Shown, top_speed: float, units: Units
-) -> str:
+def player(plan: Plan | None, playable: Motion | None, rate: float, loop: bool, drawn: Shown, units: Units) -> str:
     """Buttons and time; below them the meaning of the path's colours."""
+    if plan is None:
+        return ""
+    top_speed = plan.top_speed if drawn.path else 0.0
     top = f"{units.lengths.number(top_speed, 0)} {units.lengths.name}/s"
     legend = bar("program", f"0 {units.lengths.name}/s", top, "speed of the tool along its path", "viridis")
     return render(
         "program/player",
-        playable=playable,
-        duration=0.0 if motion is None else motion.duration,
-        rates=[(rate, rate_name(rate), rate == player.rate) for rate in RATES],
-        loop=player.loop,
+        playable=playable is not None,
+        duration=0.0 if plan.driven is None else plan.driven.duration,
+        rates=[(each, name, each == rate) for name, each in RATES.items()],
+        loop=loop,
         drawn=drawn,
-        legend=legend if drawn.path and top_speed > 1e-6 else "",
+        legend=legend if top_speed > 1e-6 else "",
     )
 
 
-def clock(player: Player, duration: float, here: int | None) -> str:
+def clock(time: float, duration: float, playing: bool, here: int | None) -> str:
     """The present moment, for the page's own script; `here`: index of the row that is driven."""
-    return render(
-        "program/clock", time=f"{player.time:.3f}", duration=f"{duration:.3f}", playing=player.playing, here=here
-    )
+    return render("program/clock", time=f"{time:.3f}", duration=f"{duration:.3f}", playing=playing, here=here)
+
+
+def playing(plan: Plan, here: int | None) -> Notice:
+    """What the status says while a row is driven."""
+    if here is None or here >= len(plan.segments):
+        return Notice("hand", "Playing", "" if here is None else "Back to the start")
+    row = plan.segments[here]
+    words = f"Waits {row.seconds:g} s" if isinstance(row, Dwell) else f"To waypoint {here + 1}"
+    return Notice("hand", "Playing", f"{words}: {row.name}" if row.name else words)
+
+
+def ended(plan: Plan, rate: float, units: Units) -> Notice:
+    """What the status says at the end of what can be driven."""
+    refusal = plan.motion.refusal
+    if refusal is None:
+        words = f"{plan.motion.duration:.2f} s, as planned." if rate == 1.0 else ""
+        return Notice("hand", "The program has ended", words)
+    return Notice("error", f"The program ends on the way to {refusal.segment + 1}", plan.explain(units))
 
 
 def list_html(
@@ -73,7 +93,10 @@ def list_html(
     opened: tuple[int | None, int],
     fault: Fault | None,
     loop: bool,
-    fields: Fields,
+    robot: Robot,
+    units: Units,
+    frame: Array,
+    task: Task,
     by_pose: bool,
     revision: int,
 ) -> str:
@@ -81,30 +104,15 @@ def list_html(
 
     Args:
         opened: index of the row that is open, and which of its points the fields are of.
+        frame, task: as of `Fields`.
         by_pose: whether its values are those of the tool, not of the joints.
         revision: another one replaces what was typed into the fields.
     """
+    fields = Fields(robot, units, frame, task)
     segments = () if plan is None else plan.segments
-    ends = () if plan is None else plan.ends
-    first, chosen = start_of(segments), opened[0]
-    rows = []
-    for i, segment in enumerate(segments):
-        otherwise = None if plan is None else plan.arrives_otherwise(i)
-        rows.append(
-            {
-                "title": segment.name or _title(i, segment),
-                "words": _words(segments, i, fields),
-                "time": f"{ends[i]:.2f} s" if i < len(ends) else "",
-                "kind": kind_of(segment),
-                "row": segment,
-                "otherwise": None if otherwise is None else _otherwise(otherwise, fields),
-                "starts": i == first,
-                "fault": fault if fault is not None and fault.index == i else None,
-            }
-        )
-    back = None
-    if loop and first is not None:
-        time = f"{ends[-1]:.2f} s" if plan is not None and plan.motion.planned else ""
+    chosen, back = opened[0], None
+    if loop and plan is not None:
+        time = f"{plan.ends[-1]:.2f} s" if plan.motion.planned else ""
         back = {"time": time, "fault": fault if fault is not None and fault.index == len(segments) else None}
     q: tuple[Array, ...] = () if plan is None or chosen is None else plan.q[chosen]
     begins = None
@@ -112,7 +120,7 @@ def list_html(
         begins = plan.start_as_recorded(chosen)
     return render(
         "program/list",
-        rows=rows,
+        rows=[] if plan is None else [_row(plan, i, fault, fields) for i in range(len(segments))],
         chosen=chosen,
         count=len(q),
         point=opened[1],
@@ -128,10 +136,25 @@ def list_html(
     )
 
 
-def _title(index: int, segment: Segment) -> str:
-    if isinstance(segment, Dwell):
-        return "Pause"
-    return "Spline" if isinstance(segment, Spline) else f"Waypoint {index + 1}"
+def _row(plan: Plan, index: int, fault: Fault | None, fields: Fields) -> dict[str, object]:
+    """What the list shows of a row."""
+    segment, otherwise = plan.segments[index], plan.arrives_otherwise(index)
+    return {
+        "title": title(index, segment),
+        "words": _words(plan.segments, index, fields),
+        "time": f"{plan.ends[index]:.2f} s" if index < len(plan.ends) else "",
+        "kind": kind_of(segment),
+        "row": segment,
+        "otherwise": None if otherwise is None else _otherwise(otherwise, fields),
+        "starts": index == start_of(plan.segments),
+        "fault": fault if fault is not None and fault.index == index else None,
+    }
+
+
+def title(index: int, segment: Segment) -> str:
+    """The name of a row, or what it is."""
+    usual = {Dwell: "Pause", Spline: "Spline"}
+    return segment.name or usual.get(type(segment), f"Waypoint {index + 1}")
 
 
 class Otherwise(NamedTuple):
@@ -176,10 +199,12 @@ def _words(segments: Segments, index: int, fields: Fields) -> str:
     return words
 
 
-def summary(plan: Plan, own: bool, units: Units) -> str:
+def summary(plan: Plan | None, own: bool, units: Units) -> str:
     """How long the motion takes, how near each joint comes to its limits, and what is assumed of them."""
-    motion, limits, robot = plan.driven, plan.motion.limits, plan.motion.robot
-    assert motion is not None
+    motion = None if plan is None else plan.driven
+    if plan is None or motion is None or not (plan.motion.planned or motion.duration > 0.0):
+        return ""
+    limits, robot = plan.motion.limits, plan.motion.robot
     heads = [f"{units.angles.name}{per}" for per in ("/s", "/s²", "/s³")]
     if not robot.revolute.all():
         heads = [
@@ -233,11 +258,14 @@ def _cell(peak: Peak, scale: float) -> dict[str, object]:
 
 
 def comparison(
-    motion: Motion, other: Motion | None, choice: Choice | None, zone: float, fields: Fields, words: str
+    motion: Motion | None, other: Motion | None, choice: Choice | None, zone: float, units: Units
 ) -> str:
-    """Another motion of the same waypoints beside the program; `words`: why there is none."""
+    """Another motion of the same waypoints beside the program, or why there is none."""
+    if motion is None or motion.duration == 0.0:
+        return ""
+    words = "" if other is None or other.planned else other.explain(units)
     both = [each for each in (motion, other) if each is not None and each.planned]
-    lengths = fields.units.lengths
+    lengths = units.lengths
     rows = [("duration", [(f"{each.duration:.2f} s", "") for each in both])]
     for quantity in QUANTITIES:
         ratios = [max(peak.ratio or 0.0 for peak in each.peaks if peak.quantity == quantity) for each in both]
@@ -251,11 +279,26 @@ def comparison(
         "program/compare",
         choices=CHOICES,
         choice=choice,
-        zone=fields.size(zone),
+        zone=general(zone * lengths.scale) if zone else "",
         unit=lengths.name,
         rows=rows,
         words=words or (about(choice, motion) if choice is not None else ""),
         refused=bool(words),
+    )
+
+
+def files(motion: Motion | None, any_rows: bool, own: bool, service: Service, language: str) -> str:
+    """Saving, opening, and the program as code."""
+    code = "" if motion is None else box_html(SNIPPETS[language](motion, own, service), "Copy code")
+    return render(
+        "program/files",
+        any=any_rows,
+        most=f"{LARGEST // 1000} kB",
+        most_recording=f"{BYTES // 1_000_000} MB",
+        code=code,
+        languages=list(SNIPPETS),
+        language=language,
+        motions=MOTIONS if motion is not None else {},
     )
 
 

@@ -20,7 +20,7 @@ from app.viewer.declared.fields import Settings, memory
 from app.viewer.declared.panel import Html, Node
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.scene import frame
-from app.viewer.declared.work import Runner, Sweep, Work
+from app.viewer.declared.work import Runner, Sweep, Work, in_background
 from kin import InputError
 
 UR5 = STORE.get("ur5")
@@ -146,6 +146,41 @@ def test_a_shared_computation_tells_its_progress_and_is_left() -> None:
     two.go_on([], 0.0)
     assert "other" not in cache, "nobody waits for it"
     goes_on.set()
+
+
+def test_work_in_the_background_is_its_visitors_alone_and_ends_with_the_interest_in_it() -> None:
+    began, goes_on, ended = Event(), Event(), Event()
+
+    def compute(shared: SharedComputation[object], *args: object) -> object:
+        began.set()
+        assert goes_on.wait(30)
+        try:
+            shared.check()
+        finally:
+            ended.set()
+        return object(), args
+
+    woke = [Event(), Event()]
+    declared = [work(in_background(compute), 1, 2)]
+    one, two = (Runner(event.set) for event in woke)
+    for each in (one, two):
+        each.go_on(declared, 0.0)
+    goes_on.set()
+    assert all(event.wait(30) for event in woke)
+    for each in (one, two):
+        each.go_on(declared, 0.1)
+    assert one.results["one"].value[1] == (1, 2)
+    assert one.results["one"].value[0] is not two.results["one"].value[0], "nothing is shared or kept"
+
+    goes_on.clear()
+    began.clear()
+    ended.clear()
+    one.go_on([work(in_background(compute), 3)], 0.2)
+    assert began.wait(30)
+    one.go_on([], 0.3)
+    goes_on.set()
+    assert ended.wait(30)
+    assert one.results == {}
 
 
 class Ends(Subscription[str]):

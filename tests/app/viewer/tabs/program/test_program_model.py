@@ -13,18 +13,19 @@ from hypothesis import strategies as st
 
 import kin
 from app.exports.program_toml import toml_of
+from app.viewer.arm import Arm
 from app.viewer.own_arm import clean
 from app.viewer.tabs.program import program as model
 from app.viewer.tabs.program.compare import CHOICES, Choice, jerk_is_infinite, other_motion
-from app.viewer.tabs.program.drawing import shared
-from app.viewer.tabs.program.plan import plan
-from app.viewer.tabs.program.playback import Player
-from app.viewer.tabs.program.program import as_kind, begun, opened, pack, recorded, unpack
+from app.viewer.tabs.program.plan import Asked, plan
+from app.viewer.tabs.program.program import as_kind, begun, opened, recorded, unpack
+from app.viewer.tabs.program.scene import shared
+from app.viewer.tabs.program.settings import ProgramFacts, ProgramSettings
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.program.views import QUANTITIES, assumption, comparison
 from kin import InputError
 from kin.ik.details import OrientationNotMet
-from kin.motion import Circ, Dwell, Lin, PoseTarget, Program, Ptp, Spline, motion_limits
+from kin.motion import Circ, Dwell, Lin, PoseTarget, Program, Ptp, Spline, motion_limits, program_to_dict
 from kin.motion.details import NotReached
 from kin.typed import EntryError
 from kin.units import DEFAULT_UNITS
@@ -87,7 +88,7 @@ def test_a_line_is_straight() -> None:
     along = points[-1] - points[0]
     off = np.linalg.norm(np.cross(points - points[0], along / np.linalg.norm(along)), axis=1)
     assert off.max() < 1e-5
-    assert unpack(pack(program), UR5) == program
+    assert unpack(program_to_dict(program), UR5) == program
     assert (
         opened(kin.motion.parse_program(toml_of(program, "UR5"), UR5), UR5, UR5.q_home).segments
         == program.segments
@@ -109,7 +110,7 @@ def test_a_page_and_its_link_hold_whatever_a_program_has(fields: dict[str, objec
     data = {**fields, "segments": [start, *fields.get("segments", ())]}  # type: ignore[misc]
     program = opened(kin.motion.program_from_dict(data, UR5), UR5, UR5.q_home)
     assert program == kin.motion.program_from_dict(data, UR5)
-    assert unpack(json.loads(json.dumps(pack(program))), UR5) == program
+    assert unpack(json.loads(json.dumps(program_to_dict(program))), UR5) == program
 
 
 names = st.text(max_size=60)
@@ -132,7 +133,7 @@ names = st.text(max_size=60)
 )
 def test_a_link_keeps_the_program(found: list[Ptp | Dwell]) -> None:
     program = Program((ROWS[0], *found))
-    assert unpack(json.loads(json.dumps(pack(program))), PIONEER) == program
+    assert unpack(json.loads(json.dumps(program_to_dict(program))), PIONEER) == program
 
 
 ROW = ["p", [0, 0, 0, 0, 0]]
@@ -325,7 +326,7 @@ def test_a_spline_leads_through_its_points_and_a_circle_through_its_via_point() 
     assert np.linalg.norm(points - np.array(VIA), axis=1).min() < 2e-3
     speeds = found.motion.sample(np.linspace(arc.start, arc.end, 400)).tool_speed
     assert speeds.max() <= 0.1 * (1 + 1e-9)
-    again = unpack(json.loads(json.dumps(pack(program))), UR5)
+    again = unpack(json.loads(json.dumps(program_to_dict(program))), UR5)
     assert again == program
     assert opened(kin.motion.parse_program(toml_of(program, "UR5"), UR5), UR5, UR5.q_home) == program
 
@@ -368,7 +369,7 @@ def test_motions_of_the_same_waypoints_can_be_compared(choice: Choice) -> None:
     peaks = {quantity: max(p.ratio or 0 for p in other.peaks if p.quantity == quantity) for quantity in QUANTITIES}
     assert peaks["velocity"] <= 1 + 1e-9
     assert peaks["acceleration"] <= 1 + 1e-9
-    html = comparison(own.motion, other, choice, 0.05, Fields(UR5, DEFAULT_UNITS, np.eye(4), "pose"), "")
+    html = comparison(own.motion, other, choice, 0.05, DEFAULT_UNITS)
     assert not jerk_is_infinite(own.motion)
     if choice in ("cubic", "trapezoidal"):
         assert jerk_is_infinite(other)
@@ -415,17 +416,42 @@ def test_a_file_of_poses_keeps_them_but_for_the_start() -> None:
     assert row == line.segments[0]
 
 
-def test_the_player_keeps_time() -> None:
-    player = Player(rate=2.0, playing=True)
-    player.advance(0.5, 3.0)
-    assert (player.time, player.playing) == (1.0, True)
-    player.advance(5.0, 3.0)
-    assert (player.time, player.playing) == (3.0, False)
-    player = Player(time=2.5, loop=True, playing=True)
-    player.advance(1.0, 3.0)
-    assert (player.time, player.playing) == (0.5, True)
-    player.go_to(-1.0, 3.0)
-    assert player.time == 0.0
+def facts_of(**settings: object) -> ProgramFacts:
+    """The facts of a page that shows `ROWS`, with these settings."""
+    given = ProgramSettings(programs={PIONEER.id: Program(ROWS)}, **settings)  # type: ignore[arg-type]
+    return ProgramFacts(given, Arm(PIONEER, PIONEER.q_home, PIONEER.q_home))
+
+
+def test_playing_keeps_time_stops_at_the_end_and_begins_again_in_a_loop() -> None:
+    end = facts_of().duration
+    assert facts_of(time=0.25, rate=2.0).after(0.125) == 0.5
+    assert facts_of(time=end - 0.1).after(0.2) is None
+    looped = facts_of(loop=True)
+    assert looped.duration > end, "it has a way back"
+    assert facts_of(loop=True, time=looped.duration - 0.1).after(0.3) == pytest.approx(0.2)
+    assert facts_of(time=1e9).time == end
+
+
+def test_plans_are_shared_by_facts_and_rows_that_are_gone_are_not_open() -> None:
+    facts = facts_of(chosen=3)
+    assert facts.plan is facts_of(chosen=1, time=0.5, rate=0.1).plan
+    assert facts.plan is not facts_of(loop=True).plan
+    assert (facts.chosen, facts_of(chosen=4).chosen) == (3, None)
+    assert facts.progress is facts_of().progress
+    assert facts_of(own=True).program is None, "a visitor's own arm has a program of its own"
+
+
+def test_what_is_asked_for_a_row_goes_with_the_program_and_the_obstacles() -> None:
+    asked = Asked(3, facts_of().plan, facts_of().arm)
+    facts = facts_of(way=asked, chart=asked, loop=True)
+    assert facts.way is facts.chart is asked
+    ball = kin.Obstacle("sphere", radius=0.1)
+    moved = replace(facts, arm=replace(asked.arm, obstacles=(ball,)))
+    avoiding = replace(facts, arm=replace(asked.arm, avoid=True))
+    assert (moved.way, moved.chart) == (None, None)
+    assert (avoiding.way, avoiding.chart) == (asked, None)
+    shorter = replace(facts.settings, programs={PIONEER.id: Program(ROWS[:3])})
+    assert (replace(facts, settings=shorter).way, replace(facts, settings=shorter).chart) == (None, None)
 
 
 def test_assumed_limits_are_said() -> None:

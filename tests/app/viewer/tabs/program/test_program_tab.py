@@ -71,6 +71,11 @@ def press(tab: FakeBrowser, name: str, *index: int, value: object = None) -> Non
     tab.wait(lambda: tab.script["reply"][0] >= number)
 
 
+def is_drawn(tab: FakeBrowser, name: str) -> bool:
+    """Whether the scene has this part of the program; one that is drawn again has a number."""
+    return any(re.search(rf"/{name}(-\d+)?$", node) for node in tab.nodes)
+
+
 def titles(tab: FakeBrowser) -> list[str]:
     return [html.unescape(t) for t in re.findall(r'kb-program-title" dir="auto">(.*?)<', part(tab, "list"))]
 
@@ -162,6 +167,17 @@ def test_every_change_can_be_undone(tab: FakeBrowser) -> None:
     tab.wait(lambda: titles(tab) == ["Waypoint 1"])
 
 
+def test_undoing_the_row_that_is_open_shows_the_rows_that_are_left(tab: FakeBrowser) -> None:
+    record(tab, 20, 50)
+    press(tab, "choose", 1)
+    assert "kb-program-open" in part(tab, "list")
+    tab.say("undo")
+    tab.wait(lambda: titles(tab) == ["Waypoint 1"])
+    assert "kb-program-open" not in part(tab, "list")
+    press(tab, "pause")
+    assert titles(tab) == ["Waypoint 1", "Pause"]
+
+
 def programs(link: str) -> dict[str, object]:
     return decode(link, STORE.robots).features.get("program", {}).get("programs", {})  # type: ignore[return-value]
 
@@ -231,11 +247,11 @@ def test_a_line_that_cannot_be_driven_says_what_would_help(tab: FakeBrowser) -> 
     press(tab, "field", 1, value=["kind", "lin"])
     assert "Segment 2 (LIN) cannot be driven" in part(tab, "list")
     assert part(tab, "list").count("kb-fault") == 1
-    assert any(name.endswith("/fault-way") for name in tab.nodes), "the line is red in the scene"
+    assert is_drawn(tab, "fault-way"), "the line is red in the scene"
     assert 'data-program-do="ptp" data-index="1"' in part(tab, "list")
     press(tab, "ptp", 1)
     assert "kb-fault" not in part(tab, "list")
-    assert not any(name.endswith("/fault-way") for name in tab.nodes)
+    assert not is_drawn(tab, "fault-way")
     tab.say("undo")
     tab.wait(lambda: "kb-fault" in part(tab, "list"))
 
@@ -547,7 +563,7 @@ def test_two_motions_are_compared_and_code_is_copied(tab: FakeBrowser) -> None:
     assert len(times) == 2
     assert times[1] > times[0]
     assert "kb-motion-other" in part(tab, "plot")
-    assert any(name.endswith("/other") for name in tab.nodes)
+    assert is_drawn(tab, "other")
     press(tab, "compare", value="lin")
     press(tab, "compare", value="")
     assert "kb-motion-other" not in part(tab, "plot")
@@ -563,11 +579,11 @@ def test_two_motions_are_compared_and_code_is_copied(tab: FakeBrowser) -> None:
 def test_ghosts_and_frames_are_switched(tab: FakeBrowser) -> None:
     record(tab, 20, 80)
     for name in ("ghosts", "frames"):
-        assert not any(node.endswith(f"/{name}") for node in tab.nodes)
+        assert not is_drawn(tab, name)
         press(tab, name, value=True)
-        assert any(node.endswith(f"/{name}") for node in tab.nodes)
+        assert is_drawn(tab, name)
         press(tab, name, value=False)
-        assert not any(node.endswith(f"/{name}") for node in tab.nodes)
+        assert not is_drawn(tab, name)
 
 
 def test_the_command_asks_the_service_of_the_page(port: int) -> None:

@@ -260,7 +260,7 @@ def test_with_collisions_avoided_a_start_that_touches_and_a_goal_inside_keep_the
 def test_where_the_search_is_not_installed_the_page_says_how_to_install_it(
     blocked: FakeBrowser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ways, "is_installed", lambda: False)
+    monkeypatch.setattr("kin.way.is_installed", lambda: False)
     press(blocked, "way", 1)
     assert "The search needs the package ompl" in part(blocked, "way")
     assert "<code>pip install 'kinboard[ways]'</code>" in part(blocked, "way")
