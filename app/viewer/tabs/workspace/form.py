@@ -29,7 +29,13 @@ def spec(path: str) -> Any:
 
 
 def form(
-    settings: WorkspaceSettings, said: Said, robot: Robot, others: tuple[Robot, ...], unit: Unit, sizes: Html
+    settings: WorkspaceSettings,
+    said: Said,
+    robot: Robot,
+    others: tuple[Robot, ...],
+    unit: Unit,
+    picked: Html,
+    sizes: Html,
 ) -> list[Node]:
     """Everything between cloud and tools, but for what has events of its own; `others`: robots to compare with."""
     cut = settings.cut
@@ -51,7 +57,7 @@ def form(
             "Look closer",
             [
                 Control("clicks"),
-                Html(str, (said.picked,), key="picked"),
+                picked,
                 Control("compare", spec=spec("compare").narrowed(names)),
                 Control("section"),
                 Control("axes"),

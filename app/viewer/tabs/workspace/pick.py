@@ -11,24 +11,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
 import kin
-from app.shared.clouds import Cloud
-from app.viewer.feature import Stage
+from app.shared.clouds import Cloud, Clouds
+from app.shared.computations import SharedComputation
+from app.viewer.declared.scene import Node
 from app.viewer.panel import Post
-from app.viewer.panel.status import Notice
-from app.viewer.tabs.workspace import views
-from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.cloud_nodes import CloudNodes
-from app.viewer.tabs.workspace.roots import new_root
-from app.viewer.tabs.workspace.said import Said
 from kin import InputError
 from kin.transforms import Array, finite_array
-from kin.units import grouped
 
 MARK_COLOUR = (213, 94, 0)
 PIXEL = math.radians(0.06)  # with a field of view of 38°
@@ -56,106 +52,87 @@ class Candidate:
         return other is None or (not self.hit, self.value, self.index) < (not other.hit, other.value, other.index)
 
 
-class PointPicker:
-    """Finds the clicked point and moves the arm to its configuration.
+class Clicks:
+    """Receives clicks into a scene; posts ``"click"`` with the origin and the direction of the ray."""
 
-    Posts ``"click"`` and ``"picked"`` to itself; `post` returns them.
-    """
-
-    def __init__(self, stage: Stage, said: Said, post: Post) -> None:
-        self._stage = stage
-        self._said = said
-        self._post = post
-        self._searches = 0  # number of the newest search; older ones stop
-        self._mark: viser.IcosphereHandle | None = None
+    def __init__(self, scene: viser.SceneApi, post: Post) -> None:
+        self._scene, self._post = scene, post
         self._callback: Callable[[viser.SceneClickEvent], None] | None = None
-        # The picked point: its cloud, index, configuration and position.
-        self._picked: tuple[Cloud, int, Array, Array] | None = None
 
     def listen(self, active: bool) -> None:
         """Start or stop receiving clicks."""
-        scene = self._stage.client.scene
         if self._callback is not None and not active:
-            scene.remove_click_callback(self._callback)
+            self._scene.remove_click_callback(self._callback)
             self._callback = None
         elif self._callback is None and active:
 
             async def clicked(event: viser.SceneClickEvent) -> None:
                 self._post("click", (event.ray_origin, event.ray_direction))
 
-            self._callback = scene.on_click()(clicked)  # type: ignore[arg-type]
+            self._callback = self._scene.on_click()(clicked)  # type: ignore[arg-type]
 
-    def search(self, ray: object, nodes: CloudNodes, size: float) -> None:
-        """Search the cloud for the clicked point, in a background thread; `size` of a point (m)."""
+
+class Click(NamedTuple):
+    """A click into a cloud.
+
+    Attributes:
+        cloud, parts: the cloud, and how many of its parts are drawn.
+        visible: which of some points the cut shows.
+        origin, direction: of the ray ``(3,)``, a unit vector.
+        size: diameter of a drawn point (m).
+    """
+
+    cloud: Cloud
+    parts: int
+    visible: Callable[[NDArray[np.float32]], NDArray[np.bool_] | None]
+    origin: Array
+    direction: Array
+    size: float
+
+    @classmethod
+    def of(cls, ray: object, nodes: CloudNodes, size: float) -> Click:
+        """The click of a ray that the page has sent; raises `InputError`."""
         if not isinstance(ray, tuple) or len(ray) != 2:
-            return
+            raise InputError("ray", ray, "its origin and direction")
         origin, direction = finite_array("ray", ray[0], (3,)), finite_array("ray", ray[1], (3,))
         length = float(np.linalg.norm(direction))
         if not length > 0.0:
             raise InputError("ray", ray, "a direction that is not zero")
-        self._searches += 1
-        number = self._searches
-        cloud, parts, visible = nodes.cloud, nodes.parts, nodes.visible_points()
+        return cls(nodes.cloud, nodes.parts, nodes.visible_points(), origin, direction / length, size)
 
-        def search() -> None:
-            best: Candidate | None = None
-            for i in range(parts):
-                if number != self._searches:
-                    return  # another click, or the cloud was removed
-                chunk = self._stage.clouds.part(cloud, i).result()
-                found = nearest(chunk.points, chunk.start, visible(chunk.points), origin, direction / length, size)
-                if found is not None and found.before(best):
-                    best = found
-            q = None
-            if best is not None:
-                q = kin.workspace.workspace_configurations(
-                    cloud.robot,
-                    best.index,
-                    seed=cloud.seed,
-                    strategy=cloud.strategy,
-                    constraints=cloud.constraints,
-                )
-            self._post("picked", (number, cloud, best, q, size))
 
-        run_in_background(search, "pick", self._post)
+@dataclass(frozen=True, eq=False)
+class Picked:
+    """The clicked point of a cloud: its index, its configuration ``(n,)`` and the point ``(3,)`` itself."""
 
-    def take(self, number: int, cloud: Cloud, found: Candidate | None, q: Array | None, size: float) -> None:
-        """Take the result of a search: mark the point, and move the arm there."""
-        if number != self._searches:
-            return
-        if found is None or q is None:
-            self._picked = None
-            self._said.picked = views.nothing_picked()
-            return
-        point = kin.fk(cloud.robot, q)[:3, 3]
-        self._remove_mark()
-        radius = max(1.2 * size, 0.008 * cloud.robot.reach)
-        self._mark = self._stage.client.scene.add_icosphere(
-            new_root(), radius=radius, color=MARK_COLOUR, position=point
-        )
-        self._picked = (cloud, found.index, q, point)
-        self.refresh()
-        title = f"Moved to point {grouped(found.index)}"
-        self._stage.move_to(q, Notice("hand", title, "The configuration that produced this point."))
+    cloud: Cloud
+    index: int
+    q: Array
+    point: Array
 
-    def refresh(self) -> None:
-        """Show the picked point in the present units."""
-        if self._picked is not None:
-            cloud, index, q, point = self._picked
-            units = self._stage.units
-            self._said.picked = views.picked(cloud.robot, cloud.constraints, index, q, point, units)
+    def mark(self, size: float) -> Node:
+        """A ball at the point; `size`: diameter of a drawn point (m)."""
+        radius = max(1.2 * size, 0.008 * self.cloud.robot.reach)
+        return Node("icosphere", "picked", {"radius": radius, "color": MARK_COLOUR}, self.point, keep=False)
 
-    def clear(self) -> None:
-        """Forget the picked point, and stop a search."""
-        self._searches += 1
-        self._remove_mark()
-        self._picked = None
-        self._said.picked = ""
 
-    def _remove_mark(self) -> None:
-        if self._mark is not None:
-            self._mark.remove()
-            self._mark = None
+def search(computation: SharedComputation[Any], clouds: Clouds, click: Click) -> Picked | None:
+    """The clicked point; None: there is none near the ray."""
+    cloud, best = click.cloud, None
+    for i in range(click.parts):
+        computation.check()  # another click, or the cloud was removed
+        chunk = clouds.part(cloud, i).result()
+        visible = click.visible(chunk.points)
+        found = nearest(chunk.points, chunk.start, visible, click.origin, click.direction, click.size)
+        if found is not None and found.before(best):
+            best = found
+    if best is None:
+        return None
+    seed, strategy = cloud.seed, cloud.strategy
+    q = kin.workspace.workspace_configurations(
+        cloud.robot, best.index, seed=seed, strategy=strategy, constraints=cloud.constraints
+    )
+    return Picked(cloud, best.index, q, kin.fk(cloud.robot, q)[:3, 3])
 
 
 def nearest(

@@ -9,4 +9,4 @@ _NUMBERS = count(1)
 
 def new_root() -> str:
     """A prefix of node names that was never used before."""
-    return f"/workspace-{next(_NUMBERS)}"
+    return f"/workspace-part-{next(_NUMBERS)}"

@@ -13,11 +13,9 @@ class Said:
         line, percent: progress of the cloud.
         buttons: what can be done with the cloud.
         legend: the meaning of its colours.
-        picked: the clicked point.
     """
 
     line: str = ""
     percent: float = 0.0
     buttons: tuple[str, ...] = ("Start",)
     legend: str = ""
-    picked: str = ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from app.viewer.declared.fields import Settings, choice, flag, memory, number, slider
 from app.viewer.tabs.workspace.colours import BY, MAPS, By
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Axis, Cut, Keep
+from app.viewer.tabs.workspace.pick import Click
 from kin import Robot
 from kin.units import grouped
 from kin.workspace import Strategy
@@ -62,6 +63,7 @@ class WorkspaceSettings(Settings):
         cut: along `axis`.
         opens, opened: whether a new map is cut open (until the visitor chooses a cut), and whether the present
             cut was made so.
+        click: the last one into the cloud.
         in_view: what the default view was fitted to: the number of clouds, whether there is a map, and the arm
             whose axes are shown.
     """
@@ -96,4 +98,5 @@ class WorkspaceSettings(Settings):
     cut: Cut | None = memory()
     opens: bool = memory(True, renew=False)
     opened: bool = memory(False)
+    click: Click | None = memory()
     in_view: tuple[int, bool, Robot | None] = memory((0, False, None), renew=False)

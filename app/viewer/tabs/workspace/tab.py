@@ -1,8 +1,7 @@
 """The workspace tab: its settings, and the events between its parts.
 
 Each part has a module: `cloud` (points in the scene), `cut`, `pick` (clicks on points), `sizes`, `section`, and
-the folder `capability`. Points and picks are computed in background threads that post their results here; what
-else takes long is declared as work.
+the folder `capability`. Points come from the service's cache of clouds; what else takes long is declared as work.
 """
 
 from __future__ import annotations
@@ -10,29 +9,32 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Html, Node
-from app.viewer.declared.work import Work
+from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.declared.work import Work, in_background
 from app.viewer.feature import Stage
+from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere, round_points
-from app.viewer.tabs.workspace import sizes
+from app.viewer.tabs.workspace import sizes, views
 from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
 from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
-from app.viewer.tabs.workspace.pick import PointPicker
+from app.viewer.tabs.workspace.pick import Click, Clicks, search
 from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
-from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
+from app.viewer.tabs.workspace.section.panel import SectionPanel, count, subscribe_section
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from kin.transforms import Array
+from kin.units import grouped
 from kin.warmup import CAPABILITY, CLOUDS
 from kin.workspace import CapabilityMap
 
@@ -59,7 +61,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         stage = self.stage
         window = SendWindow(stage.client, lambda: self.post("more"))
         self._clouds = CloudView(stage, self._said, self.settings, window, lambda: self.post("more"))
-        self._picker = PointPicker(stage, self._said, self.post)
+        self._clicks = Clicks(stage.client.scene, self.post)
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene)
         self._moved = 0.0  # when the arm did last
@@ -68,10 +70,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
             "more": lambda _: None,
-            "failed": _raise,
-            "click": self._search,
-            "picked": lambda found: self._picker.take(*cast(tuple[Any, ...], found)),
-            "plotted": lambda made: self._section.show_cloud(made) if self._section is not None else None,
+            "click": self._click,
             "capability": self._capability.handle,
         }
         self._clouds.report()
@@ -95,8 +94,19 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         return [
             *nodes,
             *cloud(s, self._said, actions),
-            *form(s, self._said, robot, others, unit, self._sizes()),
+            *form(s, self._said, robot, others, unit, self._picked(), self._sizes()),
         ]
+
+    def _picked(self) -> Html:
+        """The numbers of the clicked point, if there was a click."""
+        found = self.read.work("pick")
+        if self.settings.click is None or not found.finished:
+            return Html(str, key="picked")
+        return Html(views.picked, (found.value, self.stage.units), key="picked")
+
+    def scene(self) -> Sequence[SceneNode]:
+        found, click = self.facts.work("pick").value, self.settings.click
+        return [] if found is None or click is None else [found.mark(click.size)]
 
     def _sizes(self) -> Html:
         if not self.settings.sizes:
@@ -114,17 +124,19 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
                 Work("extent", lambda arm: stage.summaries.facts(arm, effort=None), (robot,)),
                 Work("sizes", stage.summaries.facts, (robot,)),
             ]
+        if self.settings.click is not None:
+            works.append(Work("pick", in_background(search), (stage.clouds, self.settings.click)))
         if (plot := self._section) is not None:
             works += [
                 Work("section", lambda arm, _: subscribe_section(stage.summaries, arm), (robot, plot)),
                 Work("outline", lambda arm, _: subscribe_section(stage.summaries, arm, True), (robot, plot)),
                 Work("dot", lambda tool, _: plot.tool_at(tool), (self.facts.T[:3, 3], plot), pace=DOT, keep=True),
             ]
-            for nodes in self._clouds.nodes[:1]:
-                found = self.facts.work("section").finished
-                counted = nodes.cloud, nodes.parts, plot.plotting, found
+            density = plot.density
+            for nodes in self._clouds.nodes[:1] if density is not None else ():
+                counted = stage.clouds, nodes.cloud, nodes.parts, density
                 redraw = REDRAW if self._clouds.busy else 0.0
-                works.append(Work("plot", lambda cloud, parts, *_: plot.count(cloud, parts), counted, pace=redraw))
+                works.append(Work("plot", in_background(count), counted, pace=redraw, keep=True))
         return works
 
     def worked(self, key: str) -> None:
@@ -134,6 +146,10 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             section.take(found, self.stage.now.T_tool[:3, 3])
         elif section is not None and key == "outline":
             section.take_outline(found, self.stage.now.T_tool[:3, 3])
+        elif section is not None and key == "plot" and found is not None:
+            section.show_cloud(*found)
+        elif key == "pick" and found is not None:
+            self.post(("do", self.event(self.on_picked), 0, 0))  # a step that can be undone
 
     # Events
 
@@ -173,7 +189,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         units = self.stage.units
         self._show_axes()
         self._clouds.show_legend()
-        self._picker.refresh()
         if self._section is not None:
             self._section.use(units)
         self._capability.refresh()
@@ -318,7 +333,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def _start(self) -> None:
         if self._clouds.start():
-            self._picker.clear()
+            self._use(replace(self.settings, click=None))
             if self._section is not None:
                 self._section.drop_cloud()
         self._listen_clicks()
@@ -326,17 +341,24 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def _clear(self) -> None:
         """Stop, and remove everything that belongs to the cloud."""
         self._clouds.clear()
-        self._picker.clear()
+        self._use(replace(self.settings, click=None))
         self._listen_clicks()
         if self._section is not None:
             self._section.drop_cloud()
 
     def _listen_clicks(self) -> None:
-        self._picker.listen(bool(self._clouds.nodes) and self.settings.clicks)
+        self._clicks.listen(bool(self._clouds.nodes) and self.settings.clicks)
 
-    def _search(self, ray: object) -> None:
+    def _click(self, ray: object) -> None:
         if self._clouds.nodes:
-            self._picker.search(ray, self._clouds.nodes[0], self.settings.size)
+            self._use(replace(self.settings, click=Click.of(ray, self._clouds.nodes[0], self.settings.size)))
+
+    def on_picked(self) -> None:
+        """Move the arm to the configuration of the clicked point."""
+        found = self.facts.work("pick").value
+        if found is not None:
+            title = f"Moved to point {grouped(found.index)}"
+            self.stage.move_to(found.q, Notice("hand", title, "The configuration that produced this point."))
 
     def _fit_view(self) -> None:
         """Fit the default view to clouds, map and axes when they appear, and to the arm when they are gone."""
@@ -393,8 +415,4 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             self._section.remove()
             self._section = None
         if visible:
-            self._section = SectionPanel(self.stage, new_root(), self.post)
-
-
-def _raise(error: object) -> None:
-    raise cast(Exception, error)
+            self._section = SectionPanel(self.stage, new_root())

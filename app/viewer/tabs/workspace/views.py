@@ -8,10 +8,9 @@ import numpy as np
 from markupsafe import Markup
 
 import kin
+from app.viewer.tabs.workspace.pick import Picked
 from app.viewer.views.templates import render
-from kin import JointConstraints, Robot
 from kin.ik.options import Locks
-from kin.transforms import Array
 from kin.units import Units, general, grouped
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
@@ -81,19 +80,17 @@ def progress(
     )
 
 
-def picked(robot: Robot, constraints: JointConstraints, index: int, q: Array, point: Array, units: Units) -> str:
-    """The numbers of the clicked point of a cloud."""
-    manipulability = float(kin.manipulability(robot, q))
-    margin = float(measured(Region.of(robot, constraints), "limit_margin", np.asarray(q)[None])[0])
+def picked(found: Picked | None, units: Units) -> str:
+    """The numbers of the clicked point of a cloud; `found`: None after a click far from all points."""
+    if found is None:
+        return render("panel/note", text="No point near that click.")
+    region = Region.of(found.cloud.robot, found.cloud.constraints)
+    manipulability = float(kin.manipulability(found.cloud.robot, found.q))
+    margin = float(measured(region, "limit_margin", np.asarray(found.q)[None])[0])
     rows = (
-        ("point", grouped(index), ""),
-        ("x y z", GAP.join(units.lengths.number(v) for v in point.tolist()), units.lengths.name),
+        ("point", grouped(found.index), ""),
+        ("x y z", GAP.join(units.lengths.number(v) for v in found.point.tolist()), units.lengths.name),
         ("manipulability w (pose)", f"{manipulability:.4f}", ""),
         ("limit margin", f"{100.0 * margin:.0f}", "%"),
     )
     return render("panel/facts", label="picked point", rows=rows, note="w: all six rows of the Jacobian")
-
-
-def nothing_picked() -> str:
-    """The message after a click far from all points."""
-    return render("panel/note", text="No point near that click.")

@@ -272,7 +272,7 @@ def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals)
     scales = colours.scale_of(PIONEER, "radius")
     assert f"{scale * scales.high:.{decimals}f} {length}" in colours.legend(scales, "viridis", units)
     point = np.array([0.1234, -0.2, 0.0])
-    text = views.picked(PIONEER, kin.JointConstraints(), 7, PIONEER.q_home, point, units)
+    text = views.picked(pick.Picked(Cloud(PIONEER, 8), 7, PIONEER.q_home, point), units)
     assert f">{scale * 0.1234:.{decimals + 1}f} &nbsp; −{scale * 0.2:.{decimals + 1}f} " in text
     assert f">{length}<" in text
 

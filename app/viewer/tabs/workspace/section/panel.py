@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
 
 from app.exports.svg import Plot, joint_colour
-from app.shared.clouds import Cloud
-from app.shared.computations import Subscription
+from app.shared.clouds import Cloud, Clouds
+from app.shared.computations import SharedComputation, Subscription
 from app.shared.summaries import Summaries
 from app.viewer.feature import Stage
-from app.viewer.panel import Post, update_html
+from app.viewer.panel import update_html
 from app.viewer.panel.part import add_html
-from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.tabs.workspace.section import plot
 from app.viewer.views.templates import render
@@ -28,14 +27,6 @@ WIDTH = 340  # pixels of the panel
 PLAIN = (110, 110, 110)
 
 
-@dataclass(frozen=True)
-class Plotted:
-    """The image of counted points."""
-
-    density: plot.Density
-    image: str
-
-
 def subscribe_section(summaries: Summaries, robot: Robot, signed: bool = False) -> Subscription[Section] | None:
     """The shared computation of the (r, z) section of a robot; None if joint 1 is prismatic.
 
@@ -44,30 +35,34 @@ def subscribe_section(summaries: Summaries, robot: Robot, signed: bool = False) 
     return summaries.section(robot, signed=signed) if robot.joints[0].kind == "revolute" else None
 
 
+def count(
+    computation: SharedComputation[Any], clouds: Clouds, cloud: Cloud, parts: int, density: plot.Density
+) -> tuple[plot.Density, str]:
+    """Count a cloud's first parts, as far as they are not counted yet; returns the counts and their image."""
+    for i in range(density.parts, parts):
+        computation.check()
+        density.add(cloud.robot, clouds.part(cloud, i).result().points)
+    return density, plot.image(density)
+
+
 class SectionPanel:
-    """A panel to the left of the scene. Posts ``"plotted"`` to itself.
+    """A panel to the left of the scene.
 
     Args:
         root: prefix of node names, never used before in this scene.
-
-    Attributes:
-        plotting: whether points are counted.
     """
 
-    def __init__(self, stage: Stage, root: str, post: Post) -> None:
+    def __init__(self, stage: Stage, root: str) -> None:
         client, robot = stage.client, stage.now.robot
         self.robot = robot
         self._scene = client.scene
         self._stage = stage
-        self._clouds = stage.clouds
         self._root = root
-        self._post = post
         self._section: Section | None = None
         self._signed: Section | None = None  # what the outline shows
         self._frame: Plot | None = None
-        # The cloud's counts; while a thread adds to them, only that thread uses them. Another cloud gets new ones.
+        # While a thread adds to them, only that thread uses them. Another cloud gets new ones.
         self._density: plot.Density | None = None
-        self.plotting = False
         self._image = ""
         self._units = stage.units
         self._outline: viser.FrameHandle | None = None
@@ -123,30 +118,17 @@ class SectionPanel:
             half = 0.5 * angle
             self._outline.wxyz = np.array([math.cos(half), *(math.sin(half) * section.v)])
 
-    def count(self, cloud: Cloud, parts: int) -> bool:
-        """Start counting a cloud's first parts into the plot; False if there are no new ones, or if busy."""
-        if self._frame is None or self._section is None or self.plotting:
-            return False
-        if self._density is not None and self._density.parts >= parts:
-            return False
-        density = self._density = self._density or plot.Density(self._frame)
-        self.plotting = True
+    @property
+    def density(self) -> plot.Density | None:
+        """The counts of the cloud so far; None: there is no plot."""
+        if self._density is None and self._frame is not None:
+            self._density = plot.Density(self._frame)
+        return self._density
 
-        def work() -> None:
-            for i in range(density.parts, parts):
-                if self._density is not density:
-                    return  # another cloud, or none
-                density.add(cloud.robot, self._clouds.part(cloud, i).result().points)
-            self._post("plotted", Plotted(density, plot.image(density)))
-
-        run_in_background(work, "plot", self._post)
-        return True
-
-    def show_cloud(self, made: Plotted) -> None:
+    def show_cloud(self, density: plot.Density, image: str) -> None:
         """Show a finished image of the points."""
-        if made.density is self._density:
-            self.plotting = False
-            self._image = made.image
+        if density is self._density:
+            self._image = image
             self._draw()
 
     def use(self, units: Units) -> None:
@@ -158,7 +140,6 @@ class SectionPanel:
     def drop_cloud(self) -> None:
         """Remove the cloud from the plot; the section stays."""
         self._density = None
-        self.plotting = False
         self._image = ""
         self._draw()
 
