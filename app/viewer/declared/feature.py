@@ -75,7 +75,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
         self._panel = PanelView(stage.client.gui, self.post, stage.fence)
         self._scene = SceneView(stage.client.scene, self.key, self.post)
-        self._runner = Runner(lambda: self.post(("done", ())))
+        self._runner = Runner(lambda: (within or self).post(("done", ())))
         self.shown_at = 0.0
         self._write = self._stale = False
         self._withheld = stage.activity.withheld

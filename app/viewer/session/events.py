@@ -118,7 +118,6 @@ def pause_within(gesture: tuple[object, ...], value: object) -> float:
 
 def belongs_before(gesture: tuple[object, ...]) -> bool:
     """Whether an event of a feature only completes an earlier one, as meshes do that have been read, or equations
-    that have been derived. A part of a tab posts through it, so that its own key is inside the tab's."""
+    that have been derived."""
     key = gesture[2] if gesture[0] == "feature" else None
-    inner = key[1] if isinstance(key, tuple) and len(key) == 2 else None
-    return any(isinstance(one, tuple) and one[:1] in (("meshes",), ("done",)) for one in (key, inner))
+    return isinstance(key, tuple) and key[:1] in (("meshes",), ("done",))

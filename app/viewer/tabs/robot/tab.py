@@ -114,7 +114,7 @@ class RobotTab(Feature):
             case ("arriving", "other-text") if isinstance(value, IncomingFile):
                 if value.failure:
                     self._refuse(*value.notice)
-            case ("compare", inner):
+            case ("compare", inner) | (("done", ()) as inner):
                 self._comparing.handle(inner, value)
                 self._plan()
             case (str(name),) if name in self._handlers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from threading import Event
@@ -21,6 +21,7 @@ from app.viewer.declared.panel import Html, Node
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.scene import frame
 from app.viewer.declared.work import Runner, Sweep, Work, in_background
+from app.viewer.feature import Feature
 from kin import InputError
 
 UR5 = STORE.get("ur5")
@@ -305,3 +306,34 @@ def test_a_motion_changes_settings_that_are_shown_and_errors_of_work_are_raised_
         page.rest()
         assert not still.settings.runs
         assert page.panel()[0]["content"].endswith(" 3")
+
+
+class Tab(Feature):
+    """A tab with a part whose work ends in a thread."""
+
+    key, title = "tab", "Tab"
+
+    def __init__(self, stage: Any) -> None:
+        super().__init__(stage)
+        self.posted: list[Hashable] = []
+        self.woken = Event()
+
+    def post(self, key: Hashable, value: object = None) -> None:
+        self.posted.append(key)
+        self.woken.set()
+
+
+class Late(Still):
+    def running(self) -> Sequence[Work | Sweep]:
+        return [Work("five", in_background(lambda _: 5))]
+
+
+def test_the_end_of_work_in_a_part_wakes_the_tab_that_it_is_in() -> None:
+    with bare_page(UR5) as page:
+        tab = Tab(page)
+        part = Late(page, tab)  # type: ignore[arg-type]
+        part.tick(0.0)
+        assert tab.woken.wait(30)
+        assert tab.posted == [("done", ())], "as if it were the tab's own: it completes what the visitor did"
+        part.tick(0.0)
+        assert part.facts.work("five").value == 5

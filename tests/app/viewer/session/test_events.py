@@ -157,15 +157,11 @@ def test_how_long_a_step_may_pause(gesture: tuple[object, ...], value: object, p
     [
         (("feature", "robot", ("meshes", 3)), True),
         (("feature", "learn", ("done", ())), True),
-        (("feature", "workspace", ("capability", ("done", ()))), True),
-        (("feature", "robot", ("compare", ("done", ()))), True),
-        (("feature", "workspace", ("capability", "start")), False),
+        (("feature", "workspace", ("capability", ("do", ("on_start",), 1, 0))), False),
         (("feature", "workspace", "done"), False),
         (("feature", "robot", ("cell", 2, "a")), False),
         (("joint", "ur5", ("done", ())), False),
     ],
 )
-def test_the_end_of_work_completes_what_the_visitor_did_also_in_a_part_of_a_tab(
-    gesture: tuple[object, ...], expected: bool
-) -> None:
+def test_the_end_of_work_completes_what_the_visitor_did(gesture: tuple[object, ...], expected: bool) -> None:
     assert belongs_before(gesture) is expected
