@@ -15,9 +15,9 @@ import numpy as np
 from app.cli.files import write_file
 from app.cli.pipes.source import opened_source
 from app.cli.terminal import Notation, mounted_robot_of, pose_of, print_json, quantity, table, units_of
-from app.exports.touch import report, sheet_svg
+from app.exports.touch import as_own, report, sheet_svg
 from app.shared.answers.calibration import calibration_answer, touch_plan_answer
-from kin import InputError, Robot, builtin_robots, robot_to_toml
+from kin import InputError, Robot, robot_to_toml
 from kin.calibration import (
     Calibration,
     TableTolerances,
@@ -33,8 +33,6 @@ from kin.transforms import Array
 
 PRINTED, WAVE = 0.005, math.radians(0.5)
 TOUCHES = 20
-SOURCE = "Calibrated by touching. Nominal table: "
-LONGEST_SOURCE = 4000  # characters that robot files may have there
 
 
 class Read(NamedTuple):
@@ -88,7 +86,7 @@ def _proposed(
     return touch_postures(
         robot,
         fixture,
-        arguments.plan or TOUCHES,
+        TOUCHES if arguments.plan is None else arguments.plan,
         places=_places(arguments),
         table=height,
         done=done,
@@ -140,8 +138,8 @@ def _as_typed(error: InputError, given: Read | None, fixture: TouchFixture) -> I
     if where is not None:
         what = where[1] if where[2] is None else f"socket {int(where[2]) + 1}{where[3]}"
         return InputError("--place, --table", what, error.expected)
-    if error.field == "wave":
-        return error.renamed("--waves")
+    if option := {"wave": "--waves", "count": "--plan"}.get(error.field):
+        return error.renamed(option)
     match = re.fullmatch(r"(q|done\[0\]|sockets|done\[1\])\[(\d+)\](?:\[(\d+)\])?", error.field)
     if match is None or given is None:
         return error
@@ -184,7 +182,7 @@ def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
 
 def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
     """Print what was found, and write the arm and the report."""
-    found = replace(found, robot=_as_own(found.robot))
+    found = replace(found, robot=as_own(found.robot))
     if arguments.output is not None:
         write_file(arguments.output, robot_to_toml(found.robot))
     if arguments.html is not None:
@@ -203,10 +201,3 @@ def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
             note = "" if k in found.kept else "  left out"
             print(f"{k + 1:5d}  {millimetres(miss)}{note}")
     return 1 if found.faults or found.noise >= 2.0 else 0
-
-
-def _as_own(robot: Robot) -> Robot:
-    """The arm found, with a source of its own, and an id that a folder of robot files may have."""
-    robot_id = f"{robot.id}-calibrated" if robot.id in builtin_robots() else robot.id
-    source = robot.source if robot.source.startswith(SOURCE) else SOURCE + robot.source
-    return replace(robot, id=robot_id, source=source[:LONGEST_SOURCE])

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from html import escape
 
+from kin import Robot, builtin_robots
 from kin.calibration import Calibration, TableError, TouchBoard
 from kin.calibration.fixtures import PAPER
 from kin.calibration.words import degrees, millimetres, name_of
 from kin.units import fixed
 
+SOURCE = "Calibrated by touching. Nominal table: "
+LONGEST_SOURCE = 4000  # characters that robot files may have there
 _ARM, _LINE = 6.0, 100.0  # mm: of a cross, of the line to measure
 _STYLE = (
     "body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#1b1f24}"
@@ -19,6 +23,13 @@ _STYLE = (
     "tr.out td,tr.unseen td{color:#6a727c}svg{display:block}"
 )
 _WIDE, _ROW = 300.0, 14.0  # px of a bar chart
+
+
+def as_own(robot: Robot) -> Robot:
+    """The arm found, with a source of its own, and an id that a folder of robot files may have."""
+    robot_id = f"{robot.id}-calibrated" if robot.id in builtin_robots() else robot.id
+    source = robot.source if robot.source.startswith(SOURCE) else SOURCE + robot.source
+    return replace(robot, id=robot_id, source=source[:LONGEST_SOURCE])
 
 
 def sheet_svg(paper: str) -> str:

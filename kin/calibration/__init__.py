@@ -16,7 +16,7 @@ measured on simulated arms only (``docs/calibrate.md``).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +39,7 @@ from kin.calibration.postures import (
 from kin.calibration.results import Calibration, ExpectedError, TableError, TouchFault, TouchPlan
 from kin.calibration.words import error_text, expected_text, fault_text, millimetres, outcome
 from kin.errors import InputError, finite_number, whole_number
+from kin.ik.problem import never_cancel
 from kin.motor import Motor
 from kin.named import robot_of
 from kin.robot import NominalTable, Robot
@@ -74,6 +75,7 @@ def calibrate(
     *,
     tolerances: TableTolerances | None = None,
     noise: TouchNoise | None = None,
+    cancel: Callable[[], None] = never_cancel,
 ) -> Calibration:
     """The table of an arm as it is, from what its joints read in touches.
 
@@ -84,6 +86,7 @@ def calibrate(
         fixture: what is touched.
         tolerances: largest errors that are expected; by default those of `kin.calibration.TableTolerances.of`.
         noise: of readings and contacts; by default that of `kin.calibration.TouchNoise.of`.
+        cancel: called now and then; raises to cancel the computation.
 
     Returns:
         The arm with its own table, how well it is known, and which touches contradict the others.
@@ -100,9 +103,7 @@ def calibrate(
         1.0
     """
     robot = robot_of(robot)
-    if not isinstance(fixture, TouchFixture):
-        raise InputError("fixture", fixture, "a TouchFixture")
-    model = Model.of(robot, fixture, tolerances, noise)
+    model = Model.of(robot, fixture, tolerances, noise, cancel)
     touches = _checked_touches(model, q, sockets)
     found = checked(model, touches)
     result = _result(model, found)
@@ -122,6 +123,7 @@ def touch_postures(
     tolerances: TableTolerances | None = None,
     noise: TouchNoise | None = None,
     seed: int = 0,
+    cancel: Callable[[], None] = never_cancel,
 ) -> TouchPlan:
     """The postures in which touches say most about the tip elsewhere, and what they are expected to bring.
 
@@ -136,6 +138,7 @@ def touch_postures(
         done: ``(q, sockets)`` of touches made already, q in radians (metres); `count` further ones are proposed.
         tolerances, noise: as in `kin.calibration.calibrate`.
         seed: of the random candidates.
+        cancel: called now and then; raises to cancel the computation.
 
     Returns:
         Configurations free of collisions with the arm itself and the table.
@@ -151,20 +154,18 @@ def touch_postures(
         ((12, 6), True)
     """
     robot = robot_of(robot)
-    if not isinstance(fixture, TouchFixture):
-        raise InputError("fixture", fixture, "a TouchFixture")
     count = whole_number("count", count, 1, MOST_TOUCHES)
-    model = Model.of(robot, fixture, tolerances, noise)
+    model = Model.of(robot, fixture, tolerances, noise, cancel)
     height = _table_of(robot) if table is None else finite_number("table", table)
     poses = _poses(robot, fixture, places, height)
     scene = Scene(robot, fixture, height, poses)
-    offered = candidates(scene, whole_number("seed", seed, 0, 2**31))
+    offered = candidates(scene, whole_number("seed", seed, 0, 2**31), cancel)
     _check_offered(scene, offered, places)
     before = _made(model, done)
     whole = Touches(np.vstack([before.q, offered.q]), np.concatenate([before.at, offered.at]))
     test = workspace_poses(robot, _POSES, height)
     parts = Pieces.of(model, whole, poses, test)
-    chosen = choose(parts, whole.at, min(count, len(offered)), tuple(range(len(before))))
+    chosen = choose(parts, whole.at, min(count, len(offered)), tuple(range(len(before))), cancel)
     expected = _predicted(model, parts, chosen, test)
     new = np.array(chosen[len(before) :])
     new = new[in_order(robot, whole.q[new])]
@@ -251,10 +252,8 @@ def _readings(model: Model, q: ArrayLike, sockets: ArrayLike, names: tuple[str, 
     if values.ndim != 2 or len(values) > MOST_TOUCHES:
         raise InputError(names[0], f"shape {values.shape}", f"at most {MOST_TOUCHES} touches: (k, {robot.n})")
     at = model.fixture.check_sockets(sockets, len(values), names[1])
-    turning = robot.revolute
-    first = [model.chain.first[i] + (not turns) for i, turns in zip(robot.joint_rows, turning, strict=True)]
-    slack = 3.0 * model.sigma[first] + 4.0 * model.noise.joints(robot)
-    outside = (values < robot.lower - slack) | (values > robot.upper + slack)
+    turning, (least, most) = robot.revolute, model.readable
+    outside = (values < least) | (values > most)
     if outside.any():
         k, i = map(int, np.argwhere(outside)[0])
         low, high = float(robot.lower[i]), float(robot.upper[i])
@@ -278,7 +277,8 @@ def _result(model: Model, found: Checked) -> Calibration:
     zeros = np.where(in_motors, model.chain.zeros(fit.delta), 0.0)
     made = model.chain.robot_with(fit.delta, in_motors)
     nominal = robot.nominal or NominalTable(robot.rows, robot.tool)
-    made = replace(made, motors=_with_zeros(robot, zeros), nominal=nominal)
+    faults = tuple(_fault(robot, each, found, in_motors) for each in found.faults)
+    made = replace(made, motors=_mended(robot, zeros, faults), nominal=nominal)
     test = workspace_poses(robot, _POSES, robot.floor)
     all_misses = fit.places.misses(model.chain.points(found.touches.q, fit.delta), found.touches.at)
     T = np.tile(np.eye(4), (len(model.fixture.boards), 1, 1))
@@ -294,7 +294,7 @@ def _result(model: Model, found: Checked) -> Calibration:
         nominal=robot,
         expected=expected_error(model, fit, test),
         errors=_errors(model, fit, in_motors),
-        faults=tuple(_fault(robot, each, found) for each in found.faults),
+        faults=faults,
         unseen=_unseen(model),
         kept=found.kept,
         misses=np.linalg.norm(all_misses, axis=1),
@@ -307,15 +307,24 @@ def _result(model: Model, found: Checked) -> Calibration:
     )
 
 
-def _with_zeros(robot: Robot, zeros: Array) -> tuple[Motor, ...]:
-    """The motors with these zeros ``(n,)`` in their offsets: a joint value grows by its zero."""
+def _mended(robot: Robot, zeros: Array, faults: Sequence[TouchFault]) -> tuple[Motor, ...]:
+    """The motors whose readings mean the true joint values: with signs, and joints, that all touches have shown to
+    be others, and with these zeros ``(n,)`` in their offsets: a joint value grows by its zero."""
     of = dict(zip((joint.name for joint in robot.joints), zeros.tolist(), strict=True))
+    joints, backwards = {name: name for name in of}, set[str]()
+    for fault in faults:
+        if fault.in_motors and fault.cause == "swap":
+            joints |= dict(zip(fault.joints, fault.joints[::-1], strict=True))
+        elif fault.in_motors:  # a sign
+            backwards |= {*fault.joints}
     found = []
     for motor in robot.motors:
-        offset = motor.offset - motor.sign * motor.scale * of.get(motor.joint, 0.0)
+        joint = joints.get(motor.joint, motor.joint)
+        sign = -motor.sign if joint in backwards else motor.sign
+        offset = motor.offset - sign * motor.scale * of.get(joint, 0.0)
         if motor.unit == "ticks" and motor.begins_again:
             offset %= motor.ticks
-        found.append(replace(motor, offset=offset))
+        found.append(replace(motor, joint=joint, sign=sign, offset=offset))
     return tuple(found)
 
 
@@ -359,9 +368,10 @@ def _errors(model: Model, fit: Fit, in_motors: Mask) -> tuple[TableError, ...]:
     return tuple(found)
 
 
-def _fault(robot: Robot, fault: Fault, found: Checked) -> TouchFault:
+def _fault(robot: Robot, fault: Fault, found: Checked, in_motors: Mask) -> TouchFault:
     names = tuple(robot.joints[i].name for i in fault.joints)
-    made = TouchFault(fault.touch, fault.cause, names, fault.value, fault.socket)
+    mended = fault.touch is None and fault.cause in ("sign", "swap") and bool(in_motors[list(fault.joints)].all())
+    made = TouchFault(fault.touch, fault.cause, names, fault.value, fault.socket, mended)
     socket = 0 if fault.touch is None else int(found.touches.at[fault.touch])
     return replace(made, text=fault_text(made, socket))
 
@@ -401,11 +411,12 @@ def _advice(model: Model, expected: ExpectedError, count: int) -> str:
             continue
         other = replace(model, fixture=fixture)
         scene = Scene(robot, fixture, height, proposed_poses(robot, fixture, height))
-        offered = candidates(scene)
+        offered = candidates(scene, cancel=model.cancel)
         if len(np.unique(offered.at)) < len(scene.sockets):  # it cannot touch all of this one
             continue
         parts = Pieces.of(other, offered, scene.poses, test)
-        after = _predicted(other, parts, choose(parts, offered.at, max(count, 1)), test).after
+        chosen = choose(parts, offered.at, max(count, 1), cancel=model.cancel)
+        after = _predicted(other, parts, chosen, test).after
         if after < least:
             best, least = name, after
     if not best:

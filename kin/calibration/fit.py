@@ -136,6 +136,7 @@ def solve(model: Model, touches: Touches, start: Array | None = None, most: int 
     places = Places.near(model.fixture, now.points, at)
     weight, cost, damping, step = np.zeros((0, 3, 3)), math.inf, 1e-3, 0
     for step in range(1, most + 1):
+        model.cancel()
         A, D = places.derivatives(now.points, at)
         miss = places.misses(now.points, at)
         if step == 1 or step in _WEIGHED_AGAIN:

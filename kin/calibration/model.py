@@ -8,6 +8,7 @@ value, and of errors that move the tool point alike each gets its share.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike
 from kin.calibration.chain import Chain, Mask
 from kin.calibration.fixtures import TouchFixture, Whole
 from kin.errors import InputError, finite_number
+from kin.ik.problem import never_cancel
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 
@@ -158,6 +160,7 @@ class Model:
         sigma: ``(p,)`` standard deviations of the parameters before anything is touched, 0 for those that stay.
         noise: as it was stated.
         louder: by what it is multiplied: touches that contradict each other may ask for more than can be stated.
+        cancel: called with every step of a fit; raises to cancel it.
     """
 
     chain: Chain
@@ -165,6 +168,7 @@ class Model:
     sigma: Array
     noise: TouchNoise
     louder: float = 1.0
+    cancel: Callable[[], None] = never_cancel
 
     @classmethod
     def of(
@@ -173,12 +177,15 @@ class Model:
         fixture: TouchFixture,
         tolerances: TableTolerances | None = None,
         noise: TouchNoise | None = None,
+        cancel: Callable[[], None] = never_cancel,
     ) -> Model:
         """The model of an arm; what is not given is assumed.
 
         Raises:
-            InputError: waves of an arm with rows that follow joints: such a row has no encoder of its own.
+            InputError: no fixture; waves of an arm with rows that follow joints: these have no encoders.
         """
+        if not isinstance(fixture, TouchFixture):
+            raise InputError("fixture", fixture, "a TouchFixture")
         tolerances = TableTolerances.of(robot) if tolerances is None else tolerances
         if tolerances.wave > 0.0 and robot.coupled:
             raise InputError("wave", tolerances.wave, "0 for an arm with rows that follow joints")
@@ -192,7 +199,7 @@ class Model:
                 for each in chain.parameters
             ]
             sigma = np.where(kept, 0.0, sigma).tolist()
-        return cls(chain, fixture, np.array(sigma), noise)
+        return cls(chain, fixture, np.array(sigma), noise, cancel=cancel)
 
     @property
     def robot(self) -> Robot:
@@ -203,6 +210,14 @@ class Model:
     def count(self) -> int:
         """Number of parameters of the arm."""
         return len(self.sigma)
+
+    @property
+    def readable(self) -> tuple[Array, Array]:
+        """The least and the largest readings ``(n,)`` that make sense: a zero may be off beyond a limit."""
+        robot = self.robot
+        first = [self.chain.first[i] + (not t) for i, t in zip(robot.joint_rows, robot.revolute, strict=True)]
+        slack = 3.0 * self.sigma[first] + 4.0 * self.noise.joints(robot)
+        return robot.lower - slack, robot.upper + slack
 
     @property
     def of_table(self) -> Mask:

@@ -28,6 +28,7 @@ from kin.calibration.model import Model, tip_modes
 from kin.collision import Obstacle, clearance
 from kin.fk import fk, fk_positions, jacobian
 from kin.ik import solve_ik
+from kin.ik.problem import never_cancel
 from kin.robot import IDENTITY, Robot
 from kin.transforms import Array
 
@@ -137,12 +138,13 @@ def proposed_poses(robot: Robot, fixture: TouchFixture, table: float) -> Array:
     return np.array(found)
 
 
-def candidates(scene: Scene, seed: int = 0) -> Touches:
+def candidates(scene: Scene, seed: int = 0, cancel: Callable[[], None] = never_cancel) -> Touches:
     """Configurations that touch each socket, and the plane if there is one."""
     count = max(_FEWEST, _CANDIDATES // (len(scene.sockets) + scene.fixture.plane))
     rng = np.random.default_rng(seed)
     q, at = [], []
     for j in range(len(scene.sockets)):
+        cancel()
         if scene.robot.n < 6 or scene.robot.coupled:
             found = _by_projection(scene, j, count, rng)
         else:
@@ -265,7 +267,13 @@ class Pieces:
         return np.asarray(np.linalg.inv(J.T @ J + np.eye(J.shape[1])))
 
 
-def choose(parts: Pieces, at: Whole, count: int, start: tuple[int, ...] = ()) -> list[int]:
+def choose(
+    parts: Pieces,
+    at: Whole,
+    count: int,
+    start: tuple[int, ...] = (),
+    cancel: Callable[[], None] = never_cancel,
+) -> list[int]:
     """The best `count` candidates: one after the other, then each in turn exchanged for a better one.
 
     Args:
@@ -277,6 +285,7 @@ def choose(parts: Pieces, at: Whole, count: int, start: tuple[int, ...] = ()) ->
     chosen = list(start)
     P = parts.covariance(chosen)
     while len(chosen) < len(start) + count:
+        cancel()
         turn = at == turns[len(chosen) % len(turns)]
         turn[chosen] = False
         k = _best(parts.G, P, C, np.flatnonzero(~turn).tolist() if turn.any() else chosen)
@@ -285,6 +294,7 @@ def choose(parts: Pieces, at: Whole, count: int, start: tuple[int, ...] = ()) ->
     for _ in range(_EXCHANGES):
         before = list(chosen)
         for i in range(len(start), len(chosen)):
+            cancel()
             without = _with(P, parts.G[chosen[i]], -1.0)
             chosen[i] = _best(parts.G, without, C, chosen[:i] + chosen[i + 1 :])
             P = _with(without, parts.G[chosen[i]])

@@ -74,6 +74,7 @@ class TouchFault:
         joints: names of the joints that it is about.
         value: metres beside the socket, or radians that a zero is off; 0 for other causes.
         socket: the one that was probably touched, None for other causes.
+        in_motors: whether the motors of the arm found make up for it: another sign, joints exchanged.
         text: it in words.
     """
 
@@ -82,16 +83,18 @@ class TouchFault:
     joints: tuple[str, ...] = ()
     value: float = 0.0
     socket: int | None = None
+    in_motors: bool = False
     text: str = field(default="", repr=False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """What `kin.calibration.calibrate` has found.
 
     Attributes:
         robot: the arm with its own table. Zeros of joints that have motors are in the offsets of the motors, not
-            in the table. Its values for what the nominal motors gave are those of `corrected`.
+            in the table, and so are signs and exchanged joints that all touches have shown. Its values for what
+            the nominal motors gave are those of `corrected`.
         nominal: the arm as it was.
         expected: how far its tip is expected to be off.
         errors: of the table and the tool point, in the order of the rows.
@@ -127,6 +130,12 @@ class Calibration:
     advice: str = ""
     text: str = field(default="", repr=False)
 
+    def __repr__(self) -> str:
+        """The arm, how far its tip is expected to be off, and what became of the touches."""
+        e, used = self.expected, f"{len(self.kept)} of {len(self.misses)} touches"
+        mm = f"{1e3 * e.before:.3g} to {1e3 * e.after:.3g} mm, 95 % below {1e3 * e.bound:.3g}"
+        return f"Calibration({self.robot.id!r}, {mm}, {used}, {len(self.faults)} faults)"
+
     def corrected(self, q: ArrayLike) -> Array:
         """Joint values of `robot` for what the nominal arm reads.
 
@@ -161,7 +170,7 @@ class Calibration:
         return np.asarray(q + self.zeros + self.waves[:, 0] * np.sin(q) + self.waves[:, 1] * np.cos(q))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TouchPlan:
     """The postures in which to touch.
 
@@ -182,3 +191,8 @@ class TouchPlan:
     expected: ExpectedError
     advice: str = ""
     text: str = field(default="", repr=False)
+
+    def __repr__(self) -> str:
+        """How many touches, and how far the tip is expected to be off before and after them."""
+        e = self.expected
+        return f"TouchPlan({len(self.q)} touches, {1e3 * e.before:.3g} to {1e3 * e.after:.3g} mm)"

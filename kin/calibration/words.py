@@ -68,7 +68,9 @@ def fault_text(fault: TouchFault, socket: int) -> str:
     who = "In all touches" if fault.touch is None else f"In touch {fault.touch + 1}"
     joints = listed(fault.joints)
     done = "It was left out."
-    if fault.touch is None:
+    if fault.in_motors:
+        done = "The motors of the arm found make up for it."
+    elif fault.touch is None:
         done = "The table is that of corrected readings: correct yours too before you use it."
     match fault.cause:
         case "swap":
@@ -98,12 +100,17 @@ def expected_text(expected: ExpectedError, count: int) -> str:
 
 def outcome(found: Calibration, count: int) -> str:
     """The whole result in a few sentences."""
+    first, *rest = remarks(found, count)
+    return " ".join([first, *(fault.text for fault in found.faults), *rest])
+
+
+def remarks(found: Calibration, count: int) -> list[str]:
+    """The result of so many touches, without the mistakes in them, a sentence or two each."""
     before, after, bound = map(millimetres, (found.expected.before, found.expected.after, found.expected.bound))
     lines = [f"The tip is expected to be off by {after} (95 %: below {bound}), from {before}."]
     if not math.isnan(found.held_out[1]):
         nominal, held_out = map(millimetres, found.held_out)
         lines.append(f"Touches that the fit did not use miss by {held_out}; with the nominal table by {nominal}.")
-    lines += [fault.text for fault in found.faults]
     if found.noise >= _SEVERAL:
         lines.append(
             f"The touches scatter {fixed(found.noise, 1)} times as much as stated: play, bending or a loose "
@@ -117,4 +124,4 @@ def outcome(found: Calibration, count: int) -> str:
     lines += found.unseen
     if found.advice:
         lines.append(found.advice)
-    return " ".join(lines)
+    return lines

@@ -24,7 +24,7 @@ from kin.axes import inverse, screw_x
 from kin.errors import InputError
 from kin.fk import fk
 from kin.named import robot_of
-from kin.robot import CONVENTIONS, IDENTITY, Capsule, Convention, Joint, Matrix, Robot
+from kin.robot import CONVENTIONS, IDENTITY, Capsule, Convention, Joint, Matrix, NominalTable, Robot
 from kin.transforms import Array
 
 ALMOST = 0.05  # sine of an angle below which two axes count as almost parallel
@@ -69,7 +69,11 @@ def convert_dh(robot: Robot | str, convention: Convention) -> Robot:
         tool = robot.tool
     moved = tuple(_in_shifted_frame(each, offsets, convention) for each in robot.capsules)
     rows = tuple(replace(row, a=a, alpha=alpha) for row, (a, alpha) in zip(robot.rows, shifted, strict=True))
-    return replace(robot, convention=convention, rows=rows, base=base, tool=tool, capsules=moved)
+    nominal = robot.nominal_arm
+    if nominal is not None:
+        nominal = convert_dh(nominal, convention)
+    table = None if nominal is None else NominalTable(nominal.rows, nominal.tool)
+    return replace(robot, convention=convention, rows=rows, base=base, tool=tool, capsules=moved, nominal=table)
 
 
 def _in_shifted_frame(capsule: Capsule, offsets: list[tuple[float, float]], to: Convention) -> Capsule:

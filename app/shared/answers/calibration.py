@@ -83,6 +83,8 @@ class TouchFaultAnswer(Answer):
     """Metres beside the socket, or radians that a zero is off; 0 for other causes."""
     socket: int | None
     """The one that was probably touched; null for other causes."""
+    in_motors: bool
+    """Whether the motors of the arm found make up for it: another sign, joints exchanged."""
 
 
 class CalibrationAnswer(Answer):

@@ -130,6 +130,9 @@ def test_options_that_do_not_fit_are_refused(capsys, tmp_path: Path) -> None:
     assert "--place" in capsys.readouterr().err
     assert main(["calibrate", "ur5e", "--pin", "--print", str(tmp_path / "a.svg")]) == 2
     assert "--sheet" in capsys.readouterr().err
+    for count in ("0", "1001"):
+        assert main(["calibrate", "ur5e", "--pin", "--plan", count]) == 2
+        assert f"--plan: got {count}, expected a whole number from 1 to 1000" in capsys.readouterr().err
     assert main(["calibrate", "palletiser", "--pin", "--waves"]) == 2
     assert "expected 0 for an arm with rows that follow joints" in capsys.readouterr().err
 

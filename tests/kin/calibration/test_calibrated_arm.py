@@ -77,6 +77,16 @@ def test_another_tool_is_one_of_the_nominal_arm_too():
     assert np.abs(with_tool.T_last_tool - made.T_last_tool @ tool).max() < 1e-12
 
 
+def test_the_other_convention_has_its_nominal_table_too():
+    robot, made = calibrated("ur5e")
+    other = kin.dh.convert_dh(made, "modified")
+    assert other.nominal_arm is not None
+    assert other.nominal.rows == kin.dh.convert_dh(robot, "modified").rows
+    assert set(kin.branch_names(other)) == set(kin.branch_names(robot))
+    q = robot.random_q(np.random.default_rng(5), 20)
+    assert np.abs(kin.fk_positions(other.nominal_arm, q) - kin.fk_positions(robot, q)).max() < 1e-12
+
+
 def test_a_table_with_other_rows_is_no_longer_the_calibrated_one():
     _, made = calibrated("ur5e")
     rows = tuple(replace(row, name="other") if row.name == made.joints[2].name else row for row in made.rows)

@@ -234,6 +234,49 @@ def test_the_zeros_of_motors_are_in_their_offsets(so101):
     assert "in the offset of its motor" in in_motor[0].text
 
 
+@pytest.mark.parametrize(
+    ("mistake", "cause"),
+    [(lambda q: q * [1, -1, 1, 1, 1], "sign"), (lambda q: q[:, [0, 2, 1, 3, 4]], "swap")],
+)
+def test_motors_make_up_for_a_mistake_of_all_touches(so101, mistake, cause):
+    robot = so101.robot
+    _, _, touches = so101.simulated(11, 30)
+    q = mistake(touches.q)
+    result = kin.calibration.calibrate(robot, q, touches.at, SHEET)
+    (fault,) = [each for each in result.faults if each.touch is None]
+    assert (fault.cause, fault.in_motors) == (cause, True)
+    assert "The motors of the arm found make up for it." in fault.text
+    readings = kin.motors.readings_from_q(robot, q)
+    assert np.abs(kin.motors.q_from_readings(result.robot, readings) - result.corrected(q)).max() < 1e-9
+    assert np.abs(result.corrected(q) - touches.q).max() < 6.0 * DEG
+    bare = replace(robot, motors=())
+    assumed = {"tolerances": TableTolerances.of(robot), "noise": kin.calibration.TouchNoise.of(robot)}
+    plain = kin.calibration.calibrate(bare, q, touches.at, SHEET, **assumed)
+    assert [each.in_motors for each in plain.faults if each.touch is None] == [False]
+    assert "correct yours too before you use it" in plain.text
+
+
+def test_results_are_shown_in_one_line(ur5e):
+    _, _, touches = ur5e.simulated(12)
+    found = kin.calibration.calibrate(ur5e.robot, touches.q, touches.at, BAR, noise=FINE.noise)
+    e = found.expected
+    mm = f"{1e3 * e.before:.3g} to {1e3 * e.after:.3g} mm, 95 % below {1e3 * e.bound:.3g}"
+    assert repr(found) == f"Calibration('ur5e', {mm}, 20 of 20 touches, 0 faults)"
+    plan = kin.calibration.TouchPlan(touches.q, touches.at, np.eye(4)[None], 0.0, e)
+    assert repr(plan) == f"TouchPlan(20 touches, {1e3 * e.before:.3g} to {1e3 * e.after:.3g} mm)"
+
+
+def test_a_fit_and_a_plan_can_be_cancelled(ur5e):
+    def cancel():
+        raise RuntimeError("cancelled")
+
+    _, _, touches = ur5e.simulated(12)
+    with pytest.raises(RuntimeError, match="cancelled"):
+        kin.calibration.calibrate(ur5e.robot, touches.q, touches.at, BAR, cancel=cancel)
+    with pytest.raises(RuntimeError, match="cancelled"):
+        kin.calibration.touch_postures(ur5e.robot, BAR, 3, cancel=cancel)
+
+
 def test_the_family_can_be_kept(ur5e):
     _, _, touches = ur5e.simulated(12)
     result = kin.calibration.calibrate(
