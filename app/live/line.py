@@ -126,6 +126,7 @@ class Line:
         self._replies: deque[Reply] = deque(maxlen=REPLIES)
         self.ended = ""  # why, once it has
         self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
+        self.measured: Sequence[float] | None = None  # where the real arm was last, in joint values
         self.recording: Recording | None = None
         # What the program has heard of last, and when.
         self._prepared: tuple[tuple[str, int, int], float] = (("", 0, 0), 0.0)
@@ -165,7 +166,7 @@ class Line:
         with self._lock:
             if self._program is not program:
                 return
-            self._program, self.readings = None, None
+            self._program, self.readings, self.measured = None, None, None
             self._pending[DRAWS] = PendingUpdate({"drives": None, "clear": True, "measured": None})
         self._post(DRAWS, None)
 
@@ -175,6 +176,7 @@ class Line:
         moving = {name: value for name, value in values.items() if name not in QUIET}
         with self._lock:
             self.readings = quiet.get("readings", self.readings)
+            self.measured = quiet.get("measured", self.measured)
             for key, some in ((DRAWS, quiet), (MOVES, moving)):
                 waiting = self._pending[key].values
                 for name, value in some.items():
@@ -252,6 +254,8 @@ class Line:
 
     def use_robot(self, robot: Robot) -> None:
         """The page shows another robot."""
+        if robot is not self.robot:
+            self.measured = None
         self.robot = robot
         self.publish("robot", robot, anew=False)
 

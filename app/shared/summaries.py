@@ -1,4 +1,4 @@
-"""Sizes and sections of workspaces, and comparisons of arms, computed once for all who ask.
+"""Sizes and sections of workspaces, comparisons of arms, calibrations, computed once for all who ask.
 
 A volume takes seconds, as may the mistakes that explain why two arms differ; the other sizes take a tenth of
 one. A computation ends when the last caller leaves its subscription. A section takes some 100 kB.
@@ -6,7 +6,9 @@ one. A computation ends when the last caller leaves its subscription. A section 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
@@ -15,6 +17,7 @@ from kin.comparison import Comparison, Frames
 from kin.ik.options import FREE
 from kin.workspace import Section, WorkspaceFacts, workspace_facts, workspace_section
 
+T = TypeVar("T")
 Plane = tuple[tuple[float, ...], tuple[float, ...]]
 
 KEPT = 64  # sizes, and as many sections
@@ -35,6 +38,7 @@ class Summaries:
         self._facts: ComputationCache[WorkspaceFacts] = ComputationCache(self._executor, kept)
         self._sections: ComputationCache[Section] = ComputationCache(self._executor, kept)
         self._comparisons: ComputationCache[Comparison] = ComputationCache(self._executor, kept)
+        self._others: ComputationCache[Any] = ComputationCache(self._executor, kept)
 
     def facts(
         self,
@@ -89,14 +93,20 @@ class Summaries:
 
         return self._comparisons.subscribe((a, b, frames), compute)
 
+    def once(self, key: Hashable, compute: Callable[[Callable[[], None]], T]) -> Subscription[T]:
+        """What `compute` returns for this key, for all who ask; its argument raises once nobody waits any more."""
+        return self._others.subscribe(key, lambda computation: compute(computation.check))
+
     @property
     def pending(self) -> int:
         """How many computations wait or run."""
-        return self._facts.pending + self._sections.pending + self._comparisons.pending
+        caches = self._facts, self._sections, self._comparisons, self._others
+        return sum(each.pending for each in caches)
 
     def close(self) -> None:
         """Start nothing more; returns at once."""
         self._facts.close()
         self._sections.close()
         self._comparisons.close()
+        self._others.close()
         self._executor.shutdown(wait=False, cancel_futures=True)

@@ -86,6 +86,9 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
             fields["capsules"] = [_of_row(each, "row", rows, fields["rows"]) for each in capsules]
         if isinstance(motors := data.get("motors"), Sequence) and not isinstance(motors, str):
             fields["motors"] = [_of_row(_tidy(each), "joint", rows, fields["rows"]) for each in motors]
+        if isinstance(nominal := data.get("nominal"), Mapping) and isinstance(nominal.get("rows"), Sequence):
+            of_arm = [_of_row(each, "name", rows, named) for each in nominal["rows"]]
+            fields["nominal"] = {**nominal, "rows": [_of_row(each, "follows", rows, named) for each in of_arm]}
     robot = kin.robot_from_dict(fields, "your arm")
     if not SMALLEST <= robot.reach <= LARGEST:
         limits = f"lengths a and d (or a tool) that reach {SMALLEST * 1000:g} mm to {LARGEST:g} m"
@@ -208,6 +211,10 @@ def unpack(value: object) -> OwnArm:
         data["capsules_source"] = value.get("ks", "")
     if (motors := value.get("o")) is not None:
         data["motors"] = [_motor(i, each) for i, each in enumerate(motors)] if isinstance(motors, list) else motors
+    if isinstance(nominal := value.get("nt"), list) and len(nominal) in (1, 2):
+        table, *tool = nominal
+        data["nominal"] = {"rows": [_row(i, row) for i, row in enumerate(table)] if isinstance(table, list) else 0}
+        data["nominal"] |= dict(zip(("tool",), tool, strict=False))
     if (pendant := value.get("p")) is not None:
         data["pendant"] = dict(map(_shown, pendant)) if isinstance(pendant, list) else pendant
     start = value.get("from", "")
@@ -273,6 +280,10 @@ def _text(robot: Robot) -> str:
             _without_end([places[item["joint"]] if "joint" in item else -1, *map(item.get, _MOTOR)])
             for item in data["motors"]
         ]
+    if "nominal" in data:
+        table = data["nominal"]
+        packed["nt"] = [[_packed_row(row, places) for row in table["rows"]]]
+        packed["nt"] += [table["tool"]] if "tool" in table else []
     if "pendant" in data:
         packed["p"] = [
             [

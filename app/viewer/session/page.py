@@ -60,6 +60,7 @@ from app.viewer.session.state import PageState
 from app.viewer.session.worker.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.tabs.program.tab import ProgramTab
+from app.viewer.tabs.robot.calibrate.feature import Calibrate
 from app.viewer.tabs.robot.motors.feature import Motors
 from app.viewer.tabs.robot.tab import RobotTab
 from app.viewer.views.templates import render
@@ -478,7 +479,8 @@ class VisitorPage(ShownArm, Worker):
             containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *tabs]
             features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
             if RobotTab in self.offered:
-                features, containers = (*features, Motors), [*containers, tabs[self.offered.index(RobotTab)]]
+                own = tabs[self.offered.index(RobotTab)]
+                features, containers = (*features, Motors, Calibrate), [*containers, own, own]
             if ProgramTab in self.offered:
                 features, containers = (*features, Connect), [*containers, tabs[self.offered.index(ProgramTab)]]
             for tab, container in zip(features, containers, strict=True):

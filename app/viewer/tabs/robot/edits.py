@@ -113,6 +113,8 @@ def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | N
     data = {key: value for key, value in data.items() if not key.startswith("capsules")}
     if "motors" in data:
         data["motors"] = [motor for motor in data["motors"] if _fits(motor, data["rows"])]
+    if "nominal" in data and _moving(data["nominal"]["rows"]) != _moving(data["rows"]):
+        del data["nominal"]  # the arm is another one than that which was calibrated
     try:
         own = _with_home(data, start)
         robot = capsules_for(before, own.robot)
@@ -141,6 +143,12 @@ def _with_home(data: Fields, start: str) -> OwnArm:
             if field is None or int(field[1]) not in kept:
                 raise
             kept.remove(int(field[1]))
+
+
+def _moving(rows: list[Fields]) -> list[tuple[object, ...]]:
+    """What moves in a table: names, kinds, and what they follow."""
+    kinds = [(row["name"], row.get("kind", "revolute"), row.get("follows")) for row in rows]
+    return [each for each in kinds if each[1] != "fixed"]
 
 
 def _fits(motor: Fields, rows: list[Fields]) -> bool:
@@ -199,6 +207,7 @@ def row_change(action: str, index: int, unit: str) -> Callable[[list[Fields]], N
 def reread(robot: Robot, own: OwnArm | None, convention: str) -> OwnArm:
     """The arm that the same table describes in this convention; raises `EditError`."""
     data, start = fields_of(robot, own)
+    data.pop("nominal", None)
     return built({**data, "convention": convention}, start, robot)
 
 
@@ -212,9 +221,11 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
     row, joint = data["rows"][index], robot.rows[index]
     if column == "name":
         row["name"] = text
-        for motor in data.get("motors", []):
-            if motor.get("joint") == joint.name:
-                motor["joint"] = text
+        nominal = data.get("nominal", {}).get("rows", [])
+        for key, tables in {"joint": data.get("motors", []), "name": nominal, "follows": nominal}.items():
+            for each in tables:
+                if each.get(key) == joint.name:
+                    each[key] = text
         for each in data["rows"]:
             if each.get("follows") == joint.name:
                 each["follows"] = text

@@ -43,13 +43,20 @@ from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.session.choices import PageChoices
+from app.viewer.tabs.robot.calibrate.feature import CalibrateSettings
 from app.viewer.tabs.workspace.capability.settings import MapSettings
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from kin import InputError
 from kin.units import DEFAULT_UNITS, Units
 
 DECLARED = tuple(lesson for lesson in LESSONS if issubclass(lesson, DeclaredFeature))
-CLASSES = (*(lesson.settings_of for lesson in DECLARED), MapSettings, WorkspaceSettings, PageChoices)
+CLASSES = (
+    *(lesson.settings_of for lesson in DECLARED),
+    MapSettings,
+    WorkspaceSettings,
+    PageChoices,
+    CalibrateSettings,
+)
 UNITS = (DEFAULT_UNITS, Units(False, "cm"), Units(True, "m"))
 JUNK = (
     None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from app.viewer.tabs.robot.edits import (
     typed,
 )
 from app.viewer.tabs.robot.presets import PRESETS
+from kin.robot import NominalTable
 from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 
@@ -264,3 +266,15 @@ def test_the_same_table_in_the_other_convention_is_another_arm():
 
 def test_a_row_without_a_name_is_named_by_its_number():
     assert type_in(UR5, ((1, "name"), " \u200b ")).robot.rows[1].name == "joint 2"
+
+
+def test_a_calibrated_arm_stays_one_until_other_rows_move():
+    made = own_arm(kin.robot_to_dict(replace(UR5, nominal=NominalTable(UR5.rows, UR5.tool))))
+    for cell, text in (((1, "a"), "-426"), ((1, "name"), "lift"), (("arm", "name"), "Mine")):
+        changed = type_in(made.robot, (cell, text), own=made)
+        assert changed.robot.nominal_arm is not None, cell
+    assert changed.robot.nominal == made.robot.nominal
+    assert converted(made.robot, made).robot.nominal_arm is not None
+    assert type_in(made.robot, ((5, "kind"), "fixed"), own=made).robot.nominal is None
+    assert changed_rows(made.robot, made, lambda rows: add_row(rows, 2, "mm")).robot.nominal is None
+    assert reread(made.robot, made, "modified").robot.nominal is None

@@ -20,7 +20,10 @@ from app.viewer.panel.robots import RobotMenu
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode
 from app.viewer.tabs.robot.presets import PRESETS
 from kin import KinematicsError
+from kin.calibration.chain import Chain
 from kin.files.read import MAX_ROWS
+from kin.robot import NominalTable
+from tests.kin.calibration.simulated import random_errors
 
 ROBOTS = tuple(kin.files.classic_robots().values())
 
@@ -95,6 +98,28 @@ def test_motors_are_in_the_link_with_the_names_that_the_rows_have_now():
     assert back == own
     assert back.robot.id != own_arm(kin.robot_to_dict(replace(so101, motors=()))).robot.id
     assert "o" not in pack(own_arm(PRESETS["wrist-6r"]))
+
+
+@pytest.mark.parametrize("robot_id", ["ur5e", "so101", "panda", "palletiser"])
+def test_a_calibrated_arm_keeps_its_nominal_table_in_the_link(robot_id):
+    nominal = kin.get_robot(robot_id)
+    chain = Chain(nominal)
+    made = chain.robot_with(random_errors(chain, np.random.default_rng(2)))
+    data = kin.robot_to_dict(replace(made, nominal=NominalTable(nominal.rows, nominal.tool)))
+    own = own_arm(data, robot_id)
+    assert own.robot.nominal_arm is not None
+    back = unpack(json.loads(json.dumps(pack(own))))
+    assert back == own
+    assert own_arm(kin.robot_to_dict(replace(own.robot, nominal=None))).robot.id != own.robot.id
+    longer = data["rows"][0]["name"] + "\n" + "x" * 60
+    for table in (data, data["nominal"]):
+        for row in table["rows"]:
+            row["name"] = longer if row["name"] == data["rows"][0]["name"] else row["name"]
+            if row.get("follows") == data["rows"][0]["name"]:
+                row["follows"] = longer
+    for motor in data.get("motors", []):
+        motor["joint"] = longer if motor.get("joint") == nominal.joints[0].name else motor.get("joint", "")
+    assert own_arm(data).robot.nominal_arm is not None, "rows whose names are cut are the same rows"
 
 
 def test_a_page_with_an_own_arm_is_restored_from_its_link():
