@@ -170,6 +170,8 @@ def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
     assert "25 % → 70 %" in page
     assert f"g = {(0.7 - 0.25) / (1 - 0.25):.2f}" in page
     assert "1 answered both" in page
+    assert "What was wrong?" in page
+    assert '<td class="n">0 of 1</td><td class="n">1</td><td class="why">Too large.</td>' in page
     named = [html.unescape(text) for text in re.findall(r'<b class="of"[^>]*>(.*?)</b>', page)]
     first, second = ([ALL.get(key).title for key in pair] for pair in PAIRS)  # type: ignore[union-attr]
     assert named == 2 * [" → ".join(first), " → ".join(second), "All"], "the names that a phone has in each cell"

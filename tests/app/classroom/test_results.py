@@ -14,6 +14,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from app.classroom.results import ForgedCodeError, MistypedCodeError, Outcome, codes, read_code, write_code
+from app.classroom.results.mistakes import MOST, Reason, mistakes
 from app.classroom.results.table import COLUMNS, Member, csv_of, rows
 from app.classroom.work import ANSWER_SHOWN, Attempt
 from kin import InputError
@@ -151,6 +152,26 @@ def test_who_needs_the_teacher_comes_first_and_everybody_has_a_row() -> None:
     assert [(row.work.score, row.work.answer) for row in table[3:5]] == [(0.0, 3), (0.5, 1)]
     (alone,) = rows(members[:1], [], task="", now=1.0)
     assert (alone.exercise, alone.state) == ("", "no answer")
+
+
+def test_the_reasons_of_wrong_answers_are_counted_by_student() -> None:
+    def wrong(seat: str, words: str, at: float) -> Attempt:
+        return replace(attempt(seat, "a", 0.5, at), verdict=words)
+
+    shown = replace(attempt("cy", "a", 0.0, 5.0), verdict=ANSWER_SHOWN)
+    members = [Member(name, name.title(), i) for i, name in enumerate(("cy", "di", "ed", "flo"), 1)]
+    attempts = [wrong("ed", "Too small.", 1.0), wrong("di", "Too large.", 2.0), wrong("di", "Too small.", 3.0)]
+    attempts += [
+        wrong("di", "Too small.", 4.0),
+        shown,
+        attempt("flo", "a", 1.0, 6.0),
+        attempt("gone", "a", 1.0, 7.0),
+    ]
+    (found,) = mistakes(members, [*attempts, attempt("flo", "b", 1.0, 8.0)])
+    assert (found.exercise, found.students, found.first) == ("a", 4, 1)
+    assert found.reasons == (Reason("Too small.", ("Di", "Ed")), Reason("Too large.", ("Di",)))
+    many = [wrong("di", f"Reason {i}.", float(i)) for i in range(2 * MOST)]
+    assert len(mistakes(members, many)[0].reasons) == MOST
 
 
 @given(st.text(max_size=12), st.text(max_size=12))

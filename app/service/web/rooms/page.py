@@ -61,6 +61,7 @@ def results_page(request: Request, status: int = 200, **values: object) -> HTMLR
         "problem": "",
         "pairs": (),
         "gains": (),
+        "mistakes": (),
     }
     guard_teacher(request.scope)
     text = _template("results.html").render(**{**known, **values, "root": "../"})

@@ -18,6 +18,7 @@ from app.classroom import COOKIE, ClassroomUnavailable, Hub
 from app.classroom.clock import now
 from app.classroom.courses import Courses, SentExercises
 from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, pairs_of
+from app.classroom.results.mistakes import Mistakes, mistakes
 from app.classroom.results.table import Row, csv_of, rows
 from app.classroom.work import Attempt
 from app.service.web.rooms.page import results_page
@@ -47,13 +48,13 @@ class Results:
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
         token = request.cookies.get(COOKIE, "")
-        room, sent, table, attempts, compared = await run_in_threadpool(self._read, token)
+        room, sent, table, attempts, compared, wrong = await run_in_threadpool(self._read, token)
         shown = await run_in_threadpool(lambda: _rows(self._known(sent), table[:MOST]))
         states = ("stuck", "gave up", "not begun", "at it", "solved", "not here yet")
         counted = [row for row in table if not sent.task or row.exercise == sent.task]
         counts = {state: sum(row.state == state for row in counted) for state in states}
         pairs, found = compared
-        titles = await run_in_threadpool(lambda: self._known(sent).titles) if pairs else {}
+        titles = await run_in_threadpool(lambda: self._known(sent).titles) if pairs or wrong else {}
         return results_page(
             request,
             room=room,
@@ -63,6 +64,7 @@ class Results:
             attempts=attempts,
             pairs=[[titles.get(key, key) for key in pair] for pair in pairs],
             gains=[_compared(row) for row in found[: MOST + 1]],
+            mistakes=[(titles.get(one.exercise, one.exercise), one) for one in wrong],
         )
 
     async def download(self, request: Request) -> Response:
@@ -79,12 +81,14 @@ class Results:
 
     async def download_gains(self, request: Request) -> Response:
         """A row for each pair of exercises and student, and for the class."""
-        room, _, _, _, (pairs, found) = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+        room, _, _, _, (pairs, found), _ = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
         text = csv_of_gains(found, pairs)
         return Response(codecs.BOM_UTF8 + text.encode(), media_type=CSV, headers=_as_file("gains", room))
 
-    def _read(self, token: str) -> tuple[OpenRoom, Sent, list[Row], int, tuple[list[Pair], list[Gains]]]:
-        """The room of the teacher's cookie, what it was sent, its table, how many attempts, what is compared.
+    def _read(
+        self, token: str
+    ) -> tuple[OpenRoom, Sent, list[Row], int, tuple[list[Pair], list[Gains]], list[Mistakes]]:
+        """The room of the teacher's cookie, what it was sent, its table, how many attempts, comparisons, mistakes.
 
         Raises:
             ProblemError: 403.
@@ -96,7 +100,8 @@ class Results:
         sent = sent_to(database, room.id)
         members, pairs = members_of(database, room.id), pairs_of(sent.course)
         compared = pairs, gains(members, attempts, pairs) if pairs else []
-        return room, sent, rows(members, attempts, sent.task, now()), len(attempts), compared
+        table = rows(members, attempts, sent.task, now())
+        return room, sent, table, len(attempts), compared, mistakes(members, attempts)
 
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""

@@ -1,0 +1,56 @@
+"""What a class got wrong: for each exercise the reasons of wrong answers, in the words that the students read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from app.classroom.results.gains import first_scores
+from app.classroom.results.table import Member
+from app.classroom.work import Attempt
+
+MOST = 6  # reasons of an exercise
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A reason why answers were wrong, and the aliases of the students who gave such answers."""
+
+    words: str
+    students: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Mistakes:
+    """What was wrong with the answers to an exercise.
+
+    Attributes:
+        students: how many have answered it, or asked for the answer.
+        first: how many of them were right at the first try.
+        reasons: those of the most students first, `MOST` at most.
+    """
+
+    exercise: str
+    students: int
+    first: int
+    reasons: tuple[Reason, ...]
+
+
+def mistakes(members: Iterable[Member], attempts: Sequence[Attempt]) -> list[Mistakes]:
+    """Of each exercise with a wrong answer, in the order of the first ones; attempts come in the order of time."""
+    names = {one.seat: one.alias for one in sorted(members, key=lambda one: one.number)}
+    wrong: dict[str, dict[str, set[str]]] = {}
+    for one in attempts:
+        if one.seat in names and one.score < 1.0 and not one.gave_up:
+            wrong.setdefault(one.exercise, {}).setdefault(one.verdict, set()).add(one.seat)
+    first = {key: score for key, score in first_scores(attempts).items() if key[0] in names}
+    found = []
+    for exercise, reasons in wrong.items():
+        scores = [score for (_, asked), score in first.items() if asked == exercise]
+        listed = [
+            Reason(words, tuple(names[seat] for seat in names if seat in seats))
+            for words, seats in reasons.items()
+        ]
+        listed.sort(key=lambda one: -len(one.students))
+        found.append(Mistakes(exercise, len(scores), sum(s >= 1.0 for s in scores), tuple(listed[:MOST])))
+    return found
