@@ -53,6 +53,7 @@ from kin.poses import (
     rotation_from_wxyz,
     xyz_rpy_from_pose,
 )
+from kin.postures import cuspidal, posture_map
 from kin.robot import Joint, Robot
 from kin.singularity import singularities
 from kin.transforms import wxyz_from_rotation
@@ -80,6 +81,7 @@ __all__ = [
     "compare",
     "comparison",
     "connect",
+    "cuspidal",
     "dh",
     "doctor",
     "files",
@@ -106,6 +108,7 @@ __all__ = [
     "pose_log",
     "pose_to_text",
     "position_wxyz_from_pose",
+    "posture_map",
     "robot_from_dict",
     "robot_to_dict",
     "robot_to_mjcf",

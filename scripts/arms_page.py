@@ -6,10 +6,11 @@ The page *Arms* of the docs, ``docs/arms.md``, and the names of solvers in ``kin
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from app.shared.solver_names import FILE, computed_names
-from kin import Robot, builtin_robots
+from kin import InputError, Robot, builtin_robots, cuspidal
 from kin.files import classic_robots
 from kin.solvers import family_of
 
@@ -34,6 +35,26 @@ LEAD = {
     "A maker's arm ends in its flange, or between its fingers where that is said first; there z points out "
     "([picture](background/conventions.md#transforms)).",
 }
+CUSPIDAL = """
+## Cuspidal or not
+
+A cuspidal arm can change its posture without meeting a singularity
+([background](background/singularities.md#cuspidal-arms)). Arms with seven joints are judged with the last one
+locked at its home value. *Yes* comes with a verified loop, *no* with a proof; *none found* is neither. The
+literature says the same of those it names: yes of the GoFa (A. Elias, J. Wen, arXiv 2501.18505), CRX, Jaco 2 and
+xArm 6; no of arms of Universal Robots, of the PUMA 560, and of the Panda with a locked joint (P. Wenger,
+D. Chablat, arXiv 2210.05204).
+
+| verdict | how it is known | arms |
+|---|---|---|
+"""
+KNOWN = {
+    "loop": "a loop of the tool, inside the limits, verified between its samples",
+    "factors": "postures are the signs of the factors of det J",
+    "stages": "two neighbouring axes of the three joints that place a point are parallel or meet",
+    "search": "{poses} random poses, {pairs} pairs of postures",
+    "": "the arm has not as many joints as its task has dimensions",
+}
 
 
 def page() -> str:
@@ -48,6 +69,7 @@ def page() -> str:
         text += f"\n## {title}\n\n{LEAD[title]}\n\n"
         text += "| | arm | `id` | joints | reach | carries | weighs | solver |\n" + 8 * "|---" + "|\n"
         text += "".join(map(_row, arms))
+    text += CUSPIDAL + "".join(_verdicts(robots.values()))
     text += "\n## Sources\n\n"
     return text + "".join(f"- **{robot.name}** (`{robot.id}`): {robot.source}.\n" for robot in robots.values())
 
@@ -66,6 +88,26 @@ def _row(robot: Robot) -> str:
         f"`{family_of(robot)}`",
     )
     return "| " + " | ".join(cells) + " |\n"
+
+
+def _verdicts(robots: Iterable[Robot]) -> Iterator[str]:
+    """Rows of verdicts, each with the arms that have it."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for robot in robots:
+        try:
+            answer = cuspidal(
+                robot, locked=[None] * 6 + [float(robot.q_home[6])] if robot.n == 7 else None, poses=128
+            )
+            known = KNOWN[answer.evidence].format(poses=answer.poses, pairs=answer.pairs)
+            key: tuple[str, str] = (answer.verdict, known)
+            assert answer.evidence != "loop" or answer.in_limits
+        except InputError:
+            key = ("–", KNOWN[""])
+        found.setdefault(key, []).append(f"`{robot.id}`")
+    for (verdict, known), names in sorted(
+        found.items(), key=lambda item: ("yes", "no", "none found", "–").index(item[0][0])
+    ):
+        yield f"| {verdict} | {known} | {', '.join(names)} |\n"
 
 
 def _kilograms(weight: float | None) -> str:

@@ -53,6 +53,7 @@ RULES: dict[str, set[str]] = {
         *("kin.frames", "kin.poses", "kin.typed", *MODEL),
     },
     "kin/poses": {"numpy", "kin.dh", "kin.frames", "kin.poses", "kin.typed", *MODEL},
+    "kin/postures": {"numpy", "kin.ik", "kin.postures", "kin.solvers", "kin.workspace", *MODEL},
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},
     # It looks the service up by name when it is called.
     "kin/notebook": {"numpy", "kin.collision", "kin.errors", "kin.motion", "kin.robot"},

@@ -7,7 +7,7 @@ request bodies in ``uploads``, the ``classroom``, and the ``lines`` of pages wit
 
 from starlette.routing import BaseRoute
 
-from app.api import equations, fk, ik, jacobian, motion, path, way
+from app.api import equations, fk, ik, jacobian, motion, path, postures, way
 from app.api.arms import calibrate, compare, files, motors, robots
 from app.api.body import UploadMemory
 from app.api.classroom import results
@@ -40,6 +40,7 @@ _MODULES = (
     motion,
     way,
     jacobian,
+    postures,
     equations,
     download,
     socket,

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, NoReturn
 
 from app.cli import arguments as declare
 from app.cli.arguments.calibrate import add_calibrate
+from app.cli.arguments.postures import add_cuspidal, add_postures
 from app.cli.arguments.shared import Parents
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
@@ -306,6 +307,18 @@ def _load_capability() -> Run:
     return run
 
 
+def _load_cuspidal() -> Run:
+    from app.cli.workspace import run_cuspidal
+
+    return run_cuspidal
+
+
+def _load_postures() -> Run:
+    from app.cli.workspace import run_postures
+
+    return run_postures
+
+
 def _load_room() -> Run:
     from app.cli.classroom.room import run
 
@@ -341,6 +354,8 @@ COMMANDS = (
     Command("code", declare.add_code, _load_code),
     Command("robots", declare.add_robots, _load_robots, interpreted=True),
     Command("workspace", declare.add_workspace, _load_workspace),
+    Command("postures", add_postures, _load_postures),
+    Command("cuspidal", add_cuspidal, _load_cuspidal),
     Command("room", add_room, _load_room),
     Command("result", add_result, _load_result, interpreted=True),
     Command("results", add_results, _load_results, interpreted=True),

@@ -1,20 +1,37 @@
-"""``kinboard workspace``: sizes of the workspace, or its cloud as a file, a picture or a solid."""
+"""``kinboard workspace``: sizes of the workspace, or its cloud as a file, a picture or a solid.
+
+``kinboard postures``: how many there are where. ``kinboard cuspidal``: whether one turns into another.
+"""
 
 from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from app.cli.terminal import Notation, joint_constraints, print_json, robot_of, table
+from app.cli.terminal import (
+    Notation,
+    configuration,
+    joint_constraints,
+    print_json,
+    robot_of,
+    table,
+    typed_target,
+    units_of,
+)
+from app.exports import postures
 from app.exports.formats import FORMATS
 from app.exports.picture import draw
+from app.exports.progress import progress_bar
 from app.exports.save import opened, reading, save
+from app.shared.answers.postures import cuspidal_answer, posture_map_answer
 from app.shared.answers.workspace import workspace_answer
 from app.shared.clouds import Cloud
-from kin import InputError, JointConstraints, Robot
+from kin import InputError, JointConstraints, Robot, cuspidal, posture_map
+from kin.files.numbers import index_of
 from kin.workspace import WorkspaceFacts, sample_workspace, workspace_facts, workspace_section
 
 _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
@@ -143,3 +160,74 @@ def _writing(target: str, act: Callable[[], str]) -> int:
     if target != "-":
         print(f"{target}: {summary}")
     return 0
+
+
+def run_cuspidal(arguments: Namespace) -> int:
+    """Print the verdict, and the corners of the loop if there is one."""
+    robot = robot_of(arguments)
+    constraints = joint_constraints(robot, arguments)
+    with _progress(arguments) as progress:
+        found = cuspidal(
+            robot, constraints=constraints, poses=arguments.poses, seed=arguments.seed, progress=progress
+        )
+    if arguments.json:
+        return print_json(cuspidal_answer(found))
+    print(f"{robot.name} ({robot.id})\n\n{found.reason}")
+    if found.loop is not None:
+        units = Notation(robot, arguments.rad)
+        rows = [[units.joint(i, value) for i, value in enumerate(q)] for q in found.loop.tolist()]
+        print("\n" + table([joint.name for joint in robot.joints], rows))
+    return 0
+
+
+def run_postures(arguments: Namespace) -> int:
+    """Print the regions of a posture map, and write it to a file if one is named."""
+    robot, units = robot_of(arguments), units_of(arguments)
+    kind = None
+    if arguments.output is not None:
+        kind = postures.FORMATS.get(Path(arguments.output).suffix.removeprefix(".").lower())
+        if kind is None:
+            raise InputError("--output", arguments.output, "a name that ends in .svg, .png or .csv")
+    pose = None
+    if arguments.pose is not None:
+        pose, _ = typed_target(arguments.pose, None, units, robot.maker, "--pose")
+    joints = None
+    if arguments.joints is not None:
+        joints = [(index_of(text, robot.n + 1) or 0) - 1 for text in arguments.joints]
+        if min(joints) < 0:
+            raise InputError("--joints", arguments.joints, f"two joints from 1 to {robot.n}")
+    with _progress(arguments) as progress:
+        found = posture_map(
+            robot,
+            pose,
+            normal=arguments.normal,
+            joints=joints,
+            q=None if arguments.q is None else configuration(robot, arguments.q, "--q", units),
+            constraints=joint_constraints(robot, arguments),
+            respect_limits=not arguments.ignore_limits,
+            resolution=arguments.resolution,
+            progress=progress,
+        )
+    if kind is not None:
+        try:
+            with opened(arguments.output) as file:
+                file.write(kind.write(found))
+        except OSError as error:
+            raise InputError("--output", arguments.output, f"a file that can be written ({error})") from None
+    if arguments.json:
+        return print_json(posture_map_answer(found))
+    print(f"{robot.name} ({robot.id})\n\n{found.explain(units)}")
+    return 0
+
+
+@contextmanager
+def _progress(arguments: Namespace) -> Iterator[Callable[[float], None]]:
+    """A bar of percents on a terminal."""
+    done = [0]
+    with progress_bar(100, "%", sys.stderr.isatty() and not arguments.json) as advance:
+
+        def progress(part: float) -> None:
+            advance(int(100 * part) - done[0])
+            done[0] = int(100 * part)
+
+        yield progress

@@ -91,7 +91,7 @@ def workspace_section(
     length = float(np.linalg.norm(normal))
     if origin.ndim != 1 or normal.ndim != 1 or not length > 0.0:
         raise InputError("plane", plane, "a point and a normal, three numbers each, the normal not zero")
-    u, v = _axes(normal / length)
+    u, v = plane_axes(normal / length)
     return _cut(cell_map(region).cancelled_by(cancel), origin, u, v, -math.inf, count)
 
 
@@ -123,14 +123,14 @@ def profile(
     the tool is in front of the axis. In the opposite half-plane the same values reach what is behind.
     """
     point, axis, _ = base_axis(region)
-    u = faced(region.robot, axis) if signed else _axes(axis)[0]
+    u = faced(region.robot, axis) if signed else plane_axes(axis)[0]
     cells = cell_map(_turning(region, 0.5 * math.pi if signed else math.pi)).cancelled_by(cancel)
     least = -math.inf if signed else 0.0
     found = replace(_cut(cells, point - axis * (point @ axis), u, axis, least, resolution), signed=signed)
     return replace(found, arcs=arcs_of(cells, found))
 
 
-def _axes(normal: Array) -> tuple[Array, Array]:
+def plane_axes(normal: Array) -> tuple[Array, Array]:
     """Two unit vectors of the plane; v points up in vertical planes, u along x in horizontal ones."""
     if abs(normal[2]) < 0.9:
         v = np.array([0.0, 0.0, 1.0]) - normal[2] * normal

@@ -137,6 +137,8 @@ SHORT = {
     "convert_robot": ("get", "/robots/planar2r/convert", None),
     "equations": ("get", "/robots/planar2r/equations", None),
     "summary": ("get", "/robots/planar2r/workspace/summary?volume=false", None),
+    "posture_map": ("post", "/robots/planar2r/postures", {"resolution": 8}),
+    "cuspidal": ("get", "/robots/gofa/cuspidal", None),
     "capability": ("get", "/robots/planar2r/capability?resolution=4&directions=12", None),
     "plan_motion": (
         "post",
