@@ -102,17 +102,18 @@ def _entries(
     kernels = Kernel(plain(found.rows)), Kernel(plain(found.inner))
     q, T, limits = (n,), (4, 4), ((n,), (n,), (n,), (n,))
     model, params, arcs = constants["model"].shape, found.params.shape, (entries.ROWS_OF_ARCS, 3)
+    joint = [INT] if found.stepped else []
     rows, one = (((m, n), (m, 5), (m,), (m,), (m,)) for m in (k, 1))
-    made = {
+    made: dict[str, tuple[Any, tuple[Any, ...], tuple[Any, ...]]] = {
         "fk": (fk_one, (_V, _V, _M), (model, q, T)),
         "jacobian": (jacobian_one, (_V, _V, _M), (model, q, (6, n))),
         "solve": (
-            entries.solve,
-            (*kernels, _V, _V, _M, _V, _LIMITS, FLOAT, _M, _ROWS),
-            (None, None, model, params, T, q, limits, None, arcs, rows),
+            entries.by_steps if found.stepped else entries.solve,
+            (*kernels, _V, _V, _M, _V, _LIMITS, FLOAT, *joint, _M, _ROWS),
+            (None, None, model, params, T, q, limits, None, *[None for _ in joint], arcs, rows),
         ),
     }
-    if parameter is not None and not found.needs_value:
+    if parameter is not None and not found.stepped:
         made["intervals"] = (
             entries.intervals,
             (*kernels, _V, _M, _V, _LIMITS, BOOL, _M, _M),

@@ -38,6 +38,7 @@ Limits = tuple[Array, Array, Array, Array]  # lower, upper, whole turns, weights
 SOLVED, APPROXIMATE, LIMITS, UNMET, ORIENTATION, UNREACHABLE = range(6)
 INVALID = -1
 ROWS_OF_ARCS = 256
+HALF_TURN = 90  # steps of half a turn
 MEETINGS, WEIGHT, _SPREAD = 12, 0.1, 24  # as in `kin.ik.nearest`
 _POSITION, _ROTATION = TOLERANCES.closure_position, TOLERANCES.closure_rotation
 _SAME, _MET = TOLERANCES.same_branch, TOLERANCES.point_met
@@ -85,6 +86,29 @@ def solve(
         if count > 0:
             return APPROXIMATE, count
     return UNMET, 0
+
+
+def by_steps(
+    rows: Inner, inner: Inner, model: Array, params: Array, target: Array, seed: Array, limits: Limits,
+    value: float, joint: int, arcs: Array, found: Rows,
+) -> tuple[int, int]:  # fmt: skip
+    """As `solve`, of an arm whose redundancy parameter is a joint, for a value that may be NaN.
+
+    Of NaN it is by steps the one nearest to the seed's at which a configuration is inside the limits; if there is
+    none, the seed's.
+    """
+    low, high = limits[0][joint], limits[1][joint]
+    start, steps = value, 0
+    if math.isnan(value):
+        start = min(max(seed[joint], low), high)
+        steps = HALF_TURN if low <= start - math.pi and start + math.pi <= high else 2 * HALF_TURN
+    for k in range(1, 2 * steps + 2):
+        at = start + (k // 2) * (math.pi / HALF_TURN) * (1.0 if k % 2 == 0 else -1.0)
+        if low <= at <= high:
+            status, count = solve(rows, inner, model, params, target, seed, limits, at, arcs, found)
+            if steps == 0 or status <= SOLVED:  # or INVALID
+                return status, count
+    return solve(rows, inner, model, params, target, seed, limits, start, arcs, found)
 
 
 def _requirement(model: Array, limits: Limits, task: int) -> Requirement:

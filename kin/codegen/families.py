@@ -15,21 +15,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kin.angles import TURN
-from kin.axes import screw_x, screw_z
 from kin.codegen import wrappers
 from kin.codegen.source import plain
 from kin.codegen.types import Constants
 from kin.errors import InputError
 from kin.robot import Robot
-from kin.solvers import closed_form_of
 from kin.solvers.collinear7.branches import solve as solve_collinear7
 from kin.solvers.collinear7.closed_form import Collinear7
 from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import POSE, BatchKernels, ClosedForm
 from kin.solvers.coupled import Coupled
-from kin.solvers.general5.closed_form import General5
-from kin.solvers.general5.completion import BALL, completed
-from kin.solvers.general5.point import Point3
+from kin.solvers.general5.closed_form import ANY_ORIENTATION, General5
 from kin.solvers.general6 import batch as general6_batch
 from kin.solvers.general6.closed_form import General6
 from kin.solvers.general7.closed_form import General7
@@ -65,9 +61,6 @@ BOUNDS = {
     ("offset7_places_marks_of", "n"): 2 * SAMPLES,
 }
 _ELSE = "Use kin.solve_ik, or the REST service"
-# Orientations in no special position, for a point whose orientation does not matter.
-_ANGLES = (0.4, 1.2, -2.2), (1.4, 0.9, -0.2)
-_TURNS = np.array([(screw_z(a, 0.0) @ screw_x(0.0, b) @ screw_z(c, 0.0))[:3, :3] for a, b, c in _ANGLES])
 
 
 class Alone(NamedTuple):
@@ -78,13 +71,14 @@ class Alone(NamedTuple):
             to q ``(k, n)`` and the intervals of the redundancy parameter to arcs, and returns their number.
         inner: the kernel of the family that it calls; of a wrapper what it calls and the arm's numbers.
         params: what the kernel reads.
-        needs_value: whether the value of the redundancy parameter must be given.
+        stepped: whether the value of the redundancy parameter is searched for by steps: the intervals of such a
+            parameter are not known, and `kin.solve_ik`, which follows self-motions, may choose another value.
     """
 
     rows: Inner
     inner: Inner | Constants
     params: Array
-    needs_value: bool = False
+    stepped: bool = False
 
     def within(self, rows: Inner, **constants: Any) -> Alone:
         """The same for another arm, whose branches an adapter of `kin.codegen.wrappers` makes of these."""
@@ -266,17 +260,8 @@ def _counted(form: ReversedJoints | Scaled, robot: Robot) -> Alone:
 def _general5(form: General5, robot: Robot) -> Alone:
     inner = alone(robot, form.form)
     if form.point:
-        return inner.within(wrappers.of_pairs, turns=_TURNS)
+        return inner.within(wrappers.of_pairs, turn=np.ascontiguousarray(ANY_ORIENTATION))
     return inner.within(wrappers.of_completed, rolls=form.rolls)
-
-
-def _point3(form: Point3, robot: Robot) -> Alone:
-    longer = completed(form.robot, BALL)
-    six = closed_form_of(longer)
-    if six is None:
-        raise needs_python(robot, form)
-    revolute = form.robot.revolute.astype(np.float64)
-    return alone(robot, six).within(wrappers.of_point, turns=_TURNS, count=len(six.branches), revolute=revolute)
 
 
 def _general6(form: General6, robot: Robot) -> Alone:
@@ -295,7 +280,7 @@ def _general7(form: General7, robot: Robot) -> Alone:
     found = alone(robot, form.form).within(
         wrappers.of_general7, joint=fold.joint, last=fold.last, axis=fold.axis, back=fold.back
     )
-    return found._replace(needs_value=True)
+    return found._replace(stepped=True)
 
 
 def _turned(form: Turned, robot: Robot) -> Alone:
@@ -323,7 +308,6 @@ _WRAPPERS: dict[type[ClosedForm], Callable[[Any, Robot], Alone]] = {
     ReversedJoints: _counted,
     Scaled: _counted,
     General5: _general5,
-    Point3: _point3,
     General6: _general6,
     General7: _general7,
     Turned: _turned,

@@ -85,7 +85,7 @@ def c_file(arm: Arm, name: str) -> str:
         "kernels": c.unit(arm.program, arm.rooms), "constants": _constants(arm, name),
         "rows_type": c.name_of(made["solve"].kinds[-1]),
         "why_unmet": f"; {name}_nearest says why" if "nearest" in made else "",
-        "home": _numbers(arm.robot.q_home), "example": _example(arm, name),
+        "home": _numbers(arm.robot.q_home),
     }  # fmt: skip
     return _file(arm, name, "c", values)
 
@@ -119,7 +119,9 @@ def _common(arm: Arm, name: str) -> dict[str, object]:
     n, made = arm.robot.n, arm.entries
     return {
         "name": name, "NAME": name.upper(), "n": n, "k": arm.rows, "size_of_jacobian": 6 * n,
-        "arcs": entries.ROWS_OF_ARCS, "intervals": _INTERVALS, "starts": len(arm.constants.get("starts", ())),
+        "joint": f"{arm.parameter.joint}, " if arm.parameter and arm.alone.stepped else "",
+        "step": 180 // entries.HALF_TURN, "arcs": entries.ROWS_OF_ARCS, "intervals": _INTERVALS,
+        "starts": len(arm.constants.get("starts", ())),
         "parameter": "" if arm.parameter is None else _ascii(arm.parameter.label),
         "circular": "true" if arm.parameter is not None and arm.parameter.circular else "false",
         "names": ",\n    ".join(f'"{_ascii(each)}"' for each in arm.form.branches),
@@ -140,9 +142,9 @@ def _sections(arm: Arm) -> set[str]:
     found = {"intervals", "nearest"} & set(arm.entries)
     if arm.robot.n < 6:
         found.add("few")
-    if not arm.alone.needs_value:
-        found |= {"ik", "one" if arm.parameter else "all"}
-    return found | ({"ik_at"} if arm.parameter else set())
+    if arm.parameter is None:
+        return found | {"all"}
+    return found | {"ik_at", "stepped" if arm.alone.stepped else "one"}
 
 
 def _selected(text: str, sections: set[str]) -> str:
@@ -156,16 +158,9 @@ def _selected(text: str, sections: set[str]) -> str:
     return "\n".join(found) + "\n"
 
 
-def _example(arm: Arm, name: str) -> str:
-    if arm.alone.needs_value and arm.parameter is not None:
-        return f"{name}_ik_at(T, q[{arm.parameter.joint}], q, found, &count)"
-    return f"{name}_ik(T, q, found, &count)"
-
-
 def _constants(arm: Arm, name: str) -> str:
     """The arrays that are read: an unused one is a warning."""
     unused = {"held"} if arm.parameter is None else set()
-    unused |= set() if _sections(arm) & {"ik", "intervals", "nearest"} else {"turns"}
     used = arm.constants.keys() - unused
     return "\n".join(
         f"static const double {name}_{each}[{value.size}] = {{{_numbers(value)}}};"
@@ -215,10 +210,11 @@ def _head(arm: Arm, name: str, kind: str) -> Iterable[str]:
         yield f"-D{name.upper()}_IMPLEMENTATION, not together with another arm's. To try it:"
         yield f"  cc -std=c99 -O2 -D{name.upper()}_EXAMPLE {name}.c -lm"
     else:
-        offered = {"ik": "ik(T, seed)", "ik_at": "ik_at(T, value, seed)", "intervals": "intervals(T, seed)"}
+        offered = {"ik_at": "ik_at(T, value, seed)", "intervals": "intervals(T, seed)"}
         offered["nearest"] = "nearest(T, seed, point)"
         there = [call for each, call in offered.items() if each in _sections(arm)]
-        yield f"It defines one constant, {name}, with {', '.join(['fk(q)', 'jacobian(q)', *there])}."
+        always = ["fk(q)", "jacobian(q)", "ik(T, seed)"]
+        yield f"It defines one constant, {name}, with {', '.join([*always, *there])}."
         yield "Poses are 4 rows of 4 numbers."
 
 
@@ -234,7 +230,8 @@ def _not_promised(arm: Arm) -> Iterable[str]:
     if arm.parameter is not None:
         yield "Nor all configurations, of which there is a continuum: each is one of its branch, at one value of"
         label = _ascii(arm.parameter.label)
-        if arm.alone.needs_value:
-            yield f"{label}, which must be given: only Kinboard searches for it."
+        if arm.alone.stepped:
+            step = 180 // entries.HALF_TURN
+            yield f"{label}, given or by steps of {step} deg the nearest to the seed's that the limits allow."
         else:
             yield f"{label}, given or the nearest to the seed's that the limits allow."

@@ -53,7 +53,7 @@ def c_test(arm: Arm, name: str) -> str:
     low, high = np.maximum(robot.lower, -math.pi), np.minimum(robot.upper, math.pi)
     q, seeds = np.random.default_rng(59).uniform(low, high, (2, COUNT, robot.n))
     values = np.zeros(COUNT)
-    if arm.alone.needs_value and arm.parameter is not None:
+    if arm.alone.stepped and arm.parameter is not None:
         joint = arm.parameter.joint
         values = q[:, joint]
     T, found = fk(robot, q), []

@@ -19,7 +19,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Limits = tuple[Array, Array]  # lower and upper
-_AT_ZERO, _MERGE = TOLERANCES.near_miss, TOLERANCES.merge
+_AT_ZERO = TOLERANCES.near_miss
 
 
 def of_counted(
@@ -115,36 +115,15 @@ def of_pairs(
     other: Constants, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
 ) -> int:
     """Three joints, which meet the point alone: two branches of the completed arm differ in the virtual joints."""
-    rows = np.empty((2 * q.shape[0], 6))
-    _complete(other, params, _at_point(other.turns[0], T), near, limits, arcs, rows)
+    pose, rows = T.copy(), np.empty((2 * q.shape[0], 6))
+    for i in range(3):
+        for j in range(3):
+            pose[i, j] = other.turn[i, j]
+    _complete(other, params, pose, near, limits, arcs, rows)
     for i in range(q.shape[0]):
         row = 2 * i + 1 if math.isnan(rows[2 * i, 0]) else 2 * i
         for j in range(3):
             q[i, j] = rows[row, j]
-    return 0
-
-
-def of_point(
-    other: Constants, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
-) -> int:
-    """Three joints, which meet the point alone: solutions of the completed arm, those that differ in them.
-
-    They come in pairs, but for double ones: with an odd number, or none, another orientation is asked for as well.
-    """
-    count, rows = 0, np.empty((other.count, 6))
-    for i in range(q.shape[0]):
-        for j in range(3):
-            q[i, j] = math.nan
-    for turn in range(2):
-        if turn == 1 and count > 0 and count % 2 == 0:
-            break
-        _complete(other, params, _at_point(other.turns[turn], T), near, limits, arcs, rows)
-        for i in range(other.count):
-            if math.isnan(rows[i, 0]) or count == q.shape[0] or _is_known(rows[i], q, count, other.revolute):
-                continue
-            for j in range(3):
-                q[count, j] = rows[i, j]
-            count += 1
     return 0
 
 
@@ -207,27 +186,6 @@ def _complete(
     for j in range(near.shape[0]):
         there[j], low[j], high[j] = near[j], lower[j], upper[j]
     other.rows(other.inner, params, T, math.nan, there, (low, high), arcs, rows)
-
-
-def _at_point(R: Array, T: Array) -> Array:
-    """The pose with the orientation R ``(3, 3)`` at the point of T ``(4, 4)``."""
-    pose = T.copy()
-    for i in range(3):
-        for j in range(3):
-            pose[i, j] = R[i, j]
-    return pose
-
-
-def _is_known(row: Array, q: Array, count: int, revolute: Array) -> bool:
-    """Whether a configuration is one of the first `count` rows of q ``(k, 3)``."""
-    for i in range(count):
-        apart = 0.0
-        for j in range(3):
-            off = row[j] - q[i, j]
-            apart = max(apart, abs(wrap(off) if revolute[j] != 0.0 else off))
-        if apart < _MERGE:
-            return True
-    return False
 
 
 def _product(A: Array, B: Array, out: Array) -> None:

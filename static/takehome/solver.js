@@ -5,7 +5,7 @@
   const SAME = 1e-6; // m, lengths that count as equal when a point is judged too far or too near
   const WIDE = 1e-7; // rad, an interval that is more than a value
   const SUSPECT = 1e-4; // of a pivot: configurations may be on a curve
-  const STEP = Math.PI / 90; // between values of a redundancy parameter that must be searched
+  const STEP = Math.PI / 90; // between values of a redundancy parameter whose intervals are not known
 
   const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
   const minus = (a, b) => a.map((x, i) => x - b[i]);
@@ -21,25 +21,14 @@
     // The configurations of a pose: {status, rows, …}, where "unmet" leaves to `why` what comes closest. value: the one
     // that the redundancy parameter is held at; null: the nearest to the seed's.
     function answer(T, seed, value = null) {
-      const given = value ?? (kernels.ik ? null : searched(T, seed));
-      const { status, solutions } = given === null ? kernels.ik(T, seed) : kernels.ik_at(T, given, seed);
+      const { status, solutions } = value === null ? kernels.ik(T, seed) : kernels.ik_at(T, value, seed);
       const rows = solutions.map((each) => ({ ...each, row: kernels.branches.indexOf(each.branch) }));
-      const found = { status, rows, held: given };
+      const held = parameter && !kernels.intervals && status === "solved" ? rows[0].q[parameter.joint] : value;
+      const found = { status, rows, held };
       if (status === "limits") for (const each of rows) each.beyond = beyond(each.q);
       if (status === "solved" && !parameter) found.complete = about.complete && !rows.some(({ q }) => isSingular(q));
-      if (status === "solved" && given === null && parameter) found.free = intervals(T, seed).some(([low, high]) => high - low > WIDE);
+      if (status === "solved" && held === null && parameter) found.free = intervals(T, seed).some(([low, high]) => high - low > WIDE);
       return found;
-    }
-
-    // The value nearest to the seed's at which there is a configuration, where the kernels do not look for one.
-    function searched(T, seed) {
-      const { joint, low, high } = parameter;
-      for (let k = 0; k * STEP <= high - low; k++) {
-        for (const value of k ? [seed[joint] - k * STEP, seed[joint] + k * STEP] : [seed[joint]]) {
-          if (value >= low && value <= high && kernels.ik_at(T, value, seed).status === "solved") return value;
-        }
-      }
-      return seed[joint];
     }
 
     // Where no configuration is inside the limits: what comes closest, and why nothing comes closer.

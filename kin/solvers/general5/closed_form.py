@@ -36,7 +36,7 @@ from kin.transforms import Array
 
 NAME = "general5"
 TITLE = "all solutions, three to five joints"
-_TURN = (screw_z(0.4, 0.0) @ screw_x(0.0, 1.2) @ screw_z(-2.2, 0.0))[:3, :3]  # in no special position
+ANY_ORIENTATION = (screw_z(0.4, 0.0) @ screw_x(0.0, 1.2) @ screw_z(-2.2, 0.0))[:3, :3]  # in no special position
 _AT_ZERO = TOLERANCES.near_miss
 _CHUNK = 256  # targets whose solutions are compared at a time
 
@@ -120,7 +120,7 @@ class General5(ClosedForm):
         T, lower, upper = without_last(p) if free_roll else (p.T, p.lower, p.upper)
         if self.point:
             T = T.copy()
-            T[:3, :3] = _TURN
+            T[:3, :3] = ANY_ORIENTATION
         virtual = np.zeros(6 - n)
         own = self.form.redundancies(POSE)
         kept = [k for k, r in enumerate(own) if r.joint < n]
@@ -197,7 +197,7 @@ class General5(ClosedForm):
         found = np.empty((len(T), len(self.form.branches), 6))
         if self.point:
             T = T.copy()
-            T[:, :3, :3] = _TURN
+            T[:, :3, :3] = ANY_ORIENTATION
         form.many(params, T, values, near, found)
         return found
 

@@ -36,7 +36,7 @@ def test_c_computes_the_bits_of_the_compiled_kernels(robot_id, tmp_path):
     built = exact(robot, tmp_path, level)
     solved = 0
     for T, seed, q in zip(*targets(robot, random, hard), strict=True):
-        value = float(q[built.arm.parameter.joint]) if built.arm.alone.needs_value else math.nan
+        value = float(q[built.arm.parameter.joint]) if built.arm.alone.stepped else math.nan
         count, rows = answer(built.arm, T, seed, value)
         status, found, stats, branches = built.ik(T, seed, value)
         assert (status == "solved") == (count != 0)
@@ -62,12 +62,12 @@ def test_an_adapter_finds_what_the_solver_finds(robot_id):
     found = alone(robot, form)
     limits, arcs, kernels = (robot.lower, robot.upper), np.empty((256, 3)), form.kernels
     for T, seed, goal in zip(*targets(robot, 20, 0), strict=True):
-        value = float(goal[form.redundancies(POSE)[0].joint]) if found.needs_value else math.nan
+        value = float(goal[form.redundancies(POSE)[0].joint]) if found.stepped else math.nan
         q, expected = np.empty((2, len(form.branches), robot.n))
         found.rows(found.inner, found.params, T, value, seed, limits, arcs, q)
         kernels.one(kernels.params, T, value, seed, expected)
         assert np.isfinite(q).any()
-        if found.needs_value or not form.redundancies(POSE):
+        if found.stepped or not form.redundancies(POSE):
             q, expected = (rows[~np.isnan(rows[:, 0])] for rows in (q, expected))
             off = q[:, None] - expected
             off = np.where(robot.revolute, (off + math.pi) % (2.0 * math.pi) - math.pi, off)
@@ -87,8 +87,6 @@ def test_c_is_also_strict_cpp_and_clean_under_sanitizers(robot_id, tmp_path):
     subprocess.run(["g++", "-std=c++11", *STRICT, define, "-c", plus, "-o", tmp_path / "arm.o"], check=True)
     T, seeds, _ = targets(robot, 20, 100)
     (tmp_path / f"{name}.c").write_text(text)
-    at = "_at" if arm.alone.needs_value else ""
-    value = "0.3, " if at else ""
     numbers = ", ".join(repr(float(x)) for i in range(len(T)) for x in (*T[i].ravel(), *seeds[i]))
     main = f"""#define {name.upper()}_IMPLEMENTATION
 #include "{name}.c"
@@ -98,7 +96,7 @@ int main(void) {{
   {name}_solution found[{arm.rows}];
   int count, total = 0;
   for (int i = 0; i < {len(T)}; i++) {{
-    {name}_ik{at}(data[i], {value}data[i] + 16, found, &count);
+    {name}_ik(data[i], data[i] + 16, found, &count);
     total += count;
     if (i % 20 == 0) {name}_nearest(data[i], data[i] + 16, i % 40 == 0, found);
   }}
@@ -175,7 +173,7 @@ def test_a_family_without_limits_has_nothing_that_they_would_decide():
         form = closed_form_of(robot)
         found = alone(robot, form)
         if found.rows is without_limits:
-            assert found.needs_value or not form.redundancies(POSE)
+            assert found.stepped or not form.redundancies(POSE)
 
 
 @pytest.mark.full

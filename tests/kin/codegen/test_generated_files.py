@@ -15,7 +15,7 @@ from emitted import ROBOTS, STRICT, Built, compiled, targets
 from playwright._impl._driver import compute_driver_executable
 
 import kin
-from kin.codegen import c, files, js
+from kin.codegen import c, entries, files, js
 from kin.codegen.arm import arm_of
 from kin.solvers import closed_form_of
 
@@ -102,7 +102,7 @@ def test_c_answers_as_the_core_does(robot_id, tmp_path):
     branch = built.library[f"{built.name}_branch"]
     branch.restype = ctypes.c_char_p
     names = [branch(k).decode() for k in range(arm.rows)]
-    given = arm.parameter.joint if arm.alone.needs_value else None
+    given = arm.parameter.joint if arm.alone.stepped else None
     asked = targets(robot, 40, 0)
     answers = []
     for T, seed, q in zip(*asked, strict=True):
@@ -120,16 +120,15 @@ def test_c_answers_as_the_core_does(robot_id, tmp_path):
 
 def check_refusals(built: Built):
     n = built.arm.robot.n
-    at = (0.3,) if built.arm.alone.needs_value else ()
     turned = kin.pose_from_xyz_rpy([0.1, 0.2, 0.3], [0.3, 0.5, 0.7])
-    assert built.ik(turned + np.diag([9e-7 / 2.0, 0.0, 0.0, 0.0]), np.zeros(n), *at)[0] != "invalid"
+    assert built.ik(turned + np.diag([9e-7 / 2.0, 0.0, 0.0, 0.0]), np.zeros(n))[0] != "invalid"
     for T, seed in (
         (np.round(turned, 4), np.zeros(n)),
         (np.full((4, 4), math.nan), np.zeros(n)),
         (2.0 * np.eye(4), np.zeros(n)),
         (np.eye(4), np.full(n, math.inf)),
     ):
-        assert built.ik(T, seed, *at)[0] == "invalid"
+        assert built.ik(T, seed)[0] == "invalid"
     assert built.call("fk", np.full(n, math.nan), np.empty((4, 4))) == -1
 
 
@@ -155,11 +154,10 @@ def check_nearest(built: Built, asked):
 def test_javascript_answers_as_the_core_does(robot_id, tmp_path):
     robot = ROBOTS[robot_id]
     arm = arm_of(robot)
-    given = arm.parameter.joint if arm.alone.needs_value else None
+    given = arm.parameter.joint if arm.alone.stepped else None
     T, seeds, q = targets(robot, 40, 0)
     (tmp_path / "arm.js").write_text(kin.generate(robot, "js", name="arm"))
     (tmp_path / "asked.json").write_text(json.dumps({"T": T.tolist(), "seeds": seeds.tolist(), "q": q.tolist()}))
-    bad = "arm.ik(T, seed)" if given is None else "arm.ik_at(T, 0.1, seed)"
     ask = "arm.ik(T, seeds[i])" if given is None else f"arm.ik_at(T, q[i][{given}], seeds[i])"
     run = f"""
 const arm = require("./arm.js"), {{ T: poses, seeds, q }} = require("./asked.json");
@@ -167,7 +165,7 @@ const far = poses[0].map((row, r) => row.map((x, c) => (c === 3 && r < 3 ? x + 5
 const refused = [];
 const scaled = far.map((row) => row.map((x) => 2 * x));
 for (const [T, seed] of [[poses[0], [1]], [[[NaN]], seeds[0]], [scaled, seeds[0]]])
-  try {{ {bad}; }} catch (error) {{ refused.push(error.message); }}
+  try {{ arm.ik(T, seed); }} catch (error) {{ refused.push(error.message); }}
 console.log(JSON.stringify({{
   answers: poses.map((T, i) => {ask}), fk: q.map((each) => arm.fk(each)), J: arm.jacobian(q[0]),
   near: arm.nearest(far, seeds[0], true), met: arm.nearest(poses[0], seeds[0]), refused,
@@ -253,6 +251,29 @@ def test_the_intervals_of_a_redundancy_parameter_are_those_of_the_core(robot_id,
             assert np.allclose(found[solution.branch], expected, atol=1e-9)
 
 
+@pytest.mark.full
+@pytest.mark.parametrize("robot_id", ["gen3", "sawyer"])
+def test_a_joint_without_intervals_is_at_the_first_step_from_the_seed_with_a_solution(robot_id, tmp_path):
+    robot = kin.get_robot(robot_id)
+    built, step = compiled(arm_of(robot, closest=False), tmp_path, "-O1"), math.pi / entries.HALF_TURN
+    joint, moved = built.arm.parameter.joint, 0
+    for T, seed in list(zip(*targets(robot, 20, 0)[:2], strict=True)):
+        status, found, *_ = built.ik(T, seed)
+        assert status == "solved"
+        value = float(found[0, joint])
+        again = kin.solve_ik(robot, T, q_seed=seed, redundancy=value).solutions
+        assert np.allclose(found, [each.q for each in again], atol=1e-7)
+        steps = round(abs(value - seed[joint]) / step)
+        assert abs(value - seed[joint]) == pytest.approx(steps * step)
+        moved += steps > 0
+        for k in range(1 - steps, steps):
+            at = float(seed[joint] + k * step)
+            assert built.ik(T, seed, at)[0] != "solved" or not robot.lower[joint] <= at <= robot.upper[joint]
+    assert moved > 1
+    far = T + 9.0 * np.eye(4, k=3)
+    assert built.ik(far, seed)[0] == "unmet"
+
+
 @pytest.mark.parametrize("language", ["c", "js", "d.ts"])
 def test_names_of_arms_and_joints_stay_in_their_comment(language):
     hostile = 'a\nint evil;\r\u2028b\\??/ */ "'
@@ -302,11 +323,16 @@ def test_vectors_check_the_file_and_notice_a_wrong_one(robot_id, tmp_path):
 
 @pytest.mark.parametrize("language", ["c", "d.ts"])
 def test_all_configurations_are_claimed_only_where_there_is_no_continuum_of_them(language):
-    claims = "All configurations of a pose", "One configuration of each branch, at the value of", "at this value"
-    for robot_id, found in (("ur5", "all"), ("iiwa14", "one"), ("gen3", "given")):
+    claims = (
+        "All configurations of a pose",
+        "One configuration of each branch, at the value of",
+        "at one value of theta7",
+    )
+    for robot_id, found in (("ur5", "all"), ("iiwa14", "one"), ("gen3", "stepped")):
         text = kin.generate(robot_id, language, closest=False)
         there = [words in text for words in claims]
-        assert there == [found == "all", found == "one", found != "all"]
+        assert there == [found == "all", found == "one", found == "stepped"]
+        assert ("at this value" in text) == (found != "all")
         assert ("Nor all configurations" in text) == (found != "all")
         assert "there is none" in text
         assert "the limits, nearest to the seed first." in text

@@ -28,7 +28,7 @@ def _root_between(p: Array, degree: int, a: float, b: float, fa: float) -> float
         nearer = x - f / slope if slope != 0.0 else math.inf
         if not a < nearer < b:
             nearer = 0.5 * (a + b)
-        if abs(nearer - x) <= 1e-16 * abs(x) or nearer in (a, b):
+        if abs(nearer - x) <= 1e-16 * abs(x) or not a < nearer < b:
             return nearer
         x = nearer
     return x
