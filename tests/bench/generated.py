@@ -2,9 +2,13 @@
 
 One arm of each family. The same entry (all postures inside the limits, at their nearest whole turns, each checked
 by forward kinematics, sorted by the seed) solves the same targets as C (``gcc -O2``) and as JavaScript (the Node
-of Playwright), beside `kin.solve_ik`; times are processor time, least of some passes. Machine code and the stack
-of the deepest chain of calls are those of ``gcc -Os``; ``-m32 -msoft-float`` stands for a microcontroller that
-computes with floats in software.
+of Playwright), beside the kernels as numba compiles them, for arms without a redundancy parameter or with a given
+one, and beside `kin.solve_ik`; times are processor time, least of some passes. Machine code and the stack of the
+deepest chain of calls are those of ``gcc -Os``; ``-m32 -msoft-float`` stands for a microcontroller that computes
+with floats in software.
+
+A second table has the solutions of C beside those of `kin.solve_ik`, for reachable targets and for hard ones: at
+and beside quarter turns, limits and singular poses, and pulled out of reach.
 """
 
 from __future__ import annotations
@@ -30,14 +34,18 @@ from playwright._impl._driver import compute_driver_executable
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS.parent), str(TESTS / "kin" / "codegen")]
 
-from emitted import ROBOTS, targets  # noqa: E402
+from emitted import ROBOTS, Built, targets  # noqa: E402
 
 import kin  # noqa: E402
 from kin.codegen import files  # noqa: E402
 from kin.codegen.arm import Arm, arm_of  # noqa: E402
+from kin.differential.metric import weights  # noqa: E402
+from kin.ik.candidates import Requirement, Rows, unchecked  # noqa: E402
 from kin.solvers import family_of  # noqa: E402
+from kin.solvers.contract import POSE  # noqa: E402
 
-TARGETS, PASSES = 500, 5
+TARGETS, HARD, PASSES = 500, 200, 5
+SAME = 1e-5  # rad or m, between joint values of one solution
 SOFT = "pioneer5"  # the arm that is compiled for a machine without floats
 
 
@@ -46,6 +54,7 @@ class Figures(NamedTuple):
 
     c: float
     js: float
+    kernels: float | None
     solve_ik: float
     c_text: bytes
     js_text: bytes
@@ -54,12 +63,51 @@ class Figures(NamedTuple):
 
     def row(self) -> list[str]:
         """The cells of a table."""
-        times = [f"{x:.1f} µs" for x in (self.c, self.js, self.solve_ik)]
+        times = ["–" if x is None else f"{x:.1f} µs" for x in (self.c, self.js, self.kernels, self.solve_ik)]
         texts = [
             f"{len(x) / 1000:.0f} kB ({len(gzip.compress(x)) / 1000:.0f})" for x in (self.c_text, self.js_text)
         ]
         sizes = [f"{x / 1000:.0f} kB" for x in (self.code, self.stack)]
         return [*times, *texts, *sizes]
+
+
+class Answers(NamedTuple):
+    """Of one arm: the solutions of C beside those of `kin.solve_ik`, and how exact they are.
+
+    Attributes:
+        apart: the largest difference of a joint value, rad or m.
+        off: how far the tool of a solution is from its target, by `kin.fk`, m.
+    """
+
+    solutions: int
+    missing: int
+    extra: int
+    apart: float
+    off: float
+
+    def row(self) -> list[str]:
+        """The cells of a table."""
+        counts = [f"{x:,}".replace(",", " ") for x in (self.solutions, self.missing, self.extra)]
+        return [*counts, f"{self.apart:.0e}", f"{self.off:.0e}"]
+
+
+def compared(built: Built, asked: tuple[Any, Any, Any], given: int | None) -> Answers:
+    """The solutions of targets, seeds and configurations beside those of `kin.solve_ik`."""
+    robot, counts, worst = built.arm.robot, np.zeros(3, int), np.zeros(2)
+    for T, seed, q in zip(*asked, strict=True):
+        status, found, *_ = built.ik(T, seed, math.nan if given is None else float(q[given]))
+        expected = kin.solve_ik(robot, T, q_seed=seed, redundancy=None if given is None else float(q[given]))
+        a, b = np.empty((2, 0, robot.n))
+        if status == "solved":
+            a = found
+        if expected.status is kin.Status.SOLVED:
+            b = np.array([each.q for each in expected.solutions])
+        off = np.abs(a[:, None] - b).max(axis=2, initial=0.0)
+        to_b, to_a = off.min(axis=1, initial=math.inf), off.min(axis=0, initial=math.inf)
+        counts += len(a), (to_a > SAME).sum(), (to_b > SAME).sum()
+        errors = np.linalg.norm(kin.fk(robot, a)[:, :3, 3] - T[:3, 3], axis=1)
+        worst = np.maximum(worst, [to_b[to_b <= SAME].max(initial=0.0), errors.max(initial=0.0)])
+    return Answers(*counts.tolist(), *worst.tolist())
 
 
 def microseconds(run: Callable[[], int], count: int) -> tuple[float, int]:
@@ -73,9 +121,9 @@ def microseconds(run: Callable[[], int], count: int) -> tuple[float, int]:
     return 1e6 * min(spent) / count, total
 
 
-def in_c(arm: Arm, name: str, folder: Path, T: Any, seeds: Any, values: Any) -> Callable[[], int]:
-    """The C file in this process."""
-    call = f"{name}_ik_at(T + 16 * i, values[i]," if arm.alone.needs_value else f"{name}_ik(T + 16 * i,"
+def in_c(arm: Arm, name: str, folder: Path, T: Any, seeds: Any, values: Any) -> tuple[Callable[[], int], Built]:
+    """The C file in this process: all targets, and each function."""
+    call = f"{name}_ik_at(T + 16 * i, values[i]," if arm.alone.stepped else f"{name}_ik(T + 16 * i,"
     (folder / "many.c").write_text(f"""#define {name.upper()}_IMPLEMENTATION
 #include "{name}.c"
 int many(const double *T, const double *seeds, const double *values, int n) {{
@@ -89,14 +137,32 @@ int many(const double *T, const double *seeds, const double *values, int n) {{
     gcc(folder, "-shared", "-fPIC", "-O2", "many.c", "-o", "many.so", "-lm")
     library = ctypes.CDLL(str(folder / "many.so"))
     pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (T, seeds, values)]
-    return lambda: int(library.many(*pointers, len(T)))
+    return lambda: int(library.many(*pointers, len(T))), Built(arm, name, library)
+
+
+def in_kernels(arm: Arm, T: Any, seeds: Any, values: Any) -> Callable[[], int]:
+    """The compiled kernels in this process, called without checks."""
+    robot, kernels, sort, k = arm.robot, arm.form.kernels.unchecked(), unchecked(), arm.rows
+    q, truths, order = np.empty((k, robot.n)), np.empty((2, k), bool), np.empty(k, np.int64)
+    rows = Rows(q, np.empty((k, 5)), truths[0], truths[1], order)
+    limits = robot.lower, robot.upper, arm.constants["held"], weights(robot)
+    requirement = Requirement(robot.model, np.zeros(7), *limits, POSE, True)
+
+    def run() -> int:
+        total = 0
+        for pose, seed, value in zip(T, seeds, values.tolist(), strict=True):
+            kernels.one(kernels.params, pose, value, seed, q)
+            total += max(sort(requirement, pose, seed, seed, rows), 0)
+        return total
+
+    return run
 
 
 def in_javascript(arm: Arm, name: str, folder: Path, T: Any, seeds: Any, values: Any) -> tuple[float, int]:
     """Microseconds a target of the script in Node, and the solutions of a pass."""
     asked = {"T": T.tolist(), "seeds": seeds.tolist(), "values": np.nan_to_num(values).tolist()}
     (folder / "asked.json").write_text(json.dumps(asked))
-    call = "arm.ik_at(T[i], values[i], seeds[i])" if arm.alone.needs_value else "arm.ik(T[i], seeds[i])"
+    call = "arm.ik_at(T[i], values[i], seeds[i])" if arm.alone.stepped else "arm.ik(T[i], seeds[i])"
     run = f"""
 const arm = require("./{name}.js"), {{ T, seeds, values }} = require("./asked.json");
 let least = Infinity, total = 0;
@@ -158,20 +224,21 @@ def without_floats(folder: Path) -> tuple[int, int]:
     return footprint(SOFT, folder, f"{SOFT}_ik", "-m32", "-msoft-float", *headers)
 
 
-def measured(robot: kin.Robot, folder: Path) -> Figures:
-    """The figures of an arm.
+def measured(robot: kin.Robot, folder: Path) -> tuple[Figures, list[Answers]]:
+    """The figures of an arm, and the answers to reachable and to hard targets.
 
     Raises:
         SystemExit: C or JavaScript finds another number of solutions.
     """
     arm, name = arm_of(robot), files.name_for(robot, None)
     T, seeds, q = targets(robot, TARGETS, 0)
-    given = arm.parameter.joint if arm.alone.needs_value and arm.parameter else None
+    given = arm.parameter.joint if arm.alone.stepped and arm.parameter else None
     values = np.full(len(q), math.nan) if given is None else q[:, given].copy()
     texts = {"c": files.c_file(arm, name).encode(), "js": files.js_file(arm, name, "js").encode()}
     for language, text in texts.items():
         (folder / f"{name}.{language}").write_bytes(text)
-    in_c_, found = microseconds(in_c(arm, name, folder, T, seeds, values), len(T))
+    many, built = in_c(arm, name, folder, T, seeds, values)
+    in_c_, found = microseconds(many, len(T))
     in_js, also = in_javascript(arm, name, folder, T, seeds, values)
     if found != also:
         sys.exit(f"{robot.id}: {found} solutions in C, {also} in JavaScript")
@@ -182,8 +249,11 @@ def measured(robot: kin.Robot, folder: Path) -> Figures:
             for pose, seed, value in zip(T, seeds, values.tolist(), strict=True)
         )
 
-    code, deep = footprint(name, folder, f"{name}_ik" + "_at" * arm.alone.needs_value)
-    return Figures(in_c_, in_js, microseconds(ask, len(T))[0], texts["c"], texts["js"], code, deep)
+    code, deep = footprint(name, folder, f"{name}_ik" + "_at" * arm.alone.stepped)
+    alone = arm.parameter is None or given is not None
+    kernels = microseconds(in_kernels(arm, T, seeds, values), len(T))[0] if alone else None
+    figures = Figures(in_c_, in_js, kernels, microseconds(ask, len(T))[0], texts["c"], texts["js"], code, deep)
+    return figures, [compared(built, asked, given) for asked in ((T, seeds, q), targets(robot, 0, HARD))]
 
 
 def one_of_each() -> list[kin.Robot]:
@@ -195,16 +265,21 @@ def one_of_each() -> list[kin.Robot]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     options = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     options.add_argument("robots", nargs="*", help="ids of arms; by default one of each family")
     chosen = [ROBOTS[each] for each in options.parse_args().robots] or one_of_each()
-    print("| arm, family | C | JavaScript | `solve_ik` | text of C | of JavaScript | code | stack |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("| arm, family | C | JavaScript | kernels | `solve_ik` | text of C | of JavaScript | code | stack |")
+    print(9 * "|---" + "|")
+    answers: list[str] = []
     for robot in chosen:
         with tempfile.TemporaryDirectory() as folder:
-            row = measured(robot, Path(folder)).row()
-        print(" | ".join([f"| {robot.id}, `{family_of(robot)}`", *row]) + " |", flush=True)
+            figures, found = measured(robot, Path(folder))
+        print(" | ".join([f"| {robot.id}, `{family_of(robot)}`", *figures.row()]) + " |", flush=True)
+        answers.append(" | ".join([f"| {robot.id}", *found[0].row(), *found[1].row()]) + " |")
+    print(f"\n{TARGETS} reachable targets, and {HARD} hard ones:\n")
+    print("| arm |" + 2 * " solutions | missing | extra | \\|Δq\\| | FK |")
+    print(10 * "|---" + "|---|", *answers, sep="\n")
     with tempfile.TemporaryDirectory() as folder:
         code, deep = without_floats(Path(folder))
     sizes = f"{code / 1000:.0f} kB of code, {deep / 1000:.0f} kB of stack"
