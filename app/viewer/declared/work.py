@@ -18,7 +18,7 @@ from app.viewer.declared.panel import same
 
 _END = object()
 # Nothing is kept: no visitor needs the result of another.
-_ALONE = ComputationCache[Any](ThreadPoolExecutor(64, "visitor-work", lower_priority), 0)
+_ALONE = ComputationCache[Any](ThreadPoolExecutor(64, "feature-work", lower_priority), 0)
 
 
 @dataclass(frozen=True, eq=False)
