@@ -77,15 +77,15 @@ def slide(axis: str, by: float) -> np.ndarray:
     return T
 
 
-def frames(robot: str, q: Any) -> list[np.ndarray]:
-    """The frames after each row of a standard table."""
+def frames(robot: str, q: Any, share: float = 1.0) -> list[np.ndarray]:
+    """The frames after each row of a standard table, with all lengths times `share`."""
     rows, _ = rows_of(robot)
     values, found, T = iter(q), [], np.eye(4)
     for row in rows:
         value = 0.0 if row["kind"] == "fixed" else float(next(values))
         theta = row["theta"] + (value if row["kind"] == "revolute" else 0.0)
-        d = row["d"] + (value if row["kind"] == "prismatic" else 0.0)
-        T = T @ turn("z", theta) @ slide("z", d) @ slide("x", row["a"]) @ turn("x", row["alpha"])
+        d = share * row["d"] + (value if row["kind"] == "prismatic" else 0.0)
+        T = T @ turn("z", theta) @ slide("z", d) @ slide("x", share * row["a"]) @ turn("x", row["alpha"])
         found.append(T)
     return found
 
@@ -331,6 +331,17 @@ def swing(v: Numbers, labels: list[str]) -> object:
     before = frames("pioneer5", home)[-1][:3, 3]
     home[0] += v["dt"]
     return mm(np.linalg.norm(frames("pioneer5", home)[-1][:3, 3] - before))
+
+
+@solves("which-fixture")
+def which_fixture(v: Numbers, labels: list[str]) -> object:
+    """The short table draws the points near the base by one share: of each fixture, what would contradict it."""
+    q = np.random.default_rng(1).uniform(-1.5, 1.5, (20, 6))
+    true, short = (np.array([frames("ur5", each, share)[-1][:3, 3] for each in q]) for share in (1.0, 0.996))
+    assert np.allclose(short, 0.996 * true)
+    # A point stays one point, and a plane stays a plane: only a known distance is another one.
+    assert abs(0.996 * 0.150 - 0.1494) < 1e-12
+    return next(i for i, label in enumerate(labels) if "150 mm apart" in label)
 
 
 # Inverse kinematics
