@@ -320,7 +320,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         run = self._run.to(at)
         scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
         read = zip(run.read[run.at] or (), scales, strict=False)
-        self.change(run=run, joints=" ".join(f"{value * scale:.10g}" for value, scale in read))
+        self.change(run=run, joints=" ".join(f"{value * scale:.8g}" for value, scale in read))
         self.rewrite()
 
     def _take(self, q: tuple[float, ...] | None) -> None:

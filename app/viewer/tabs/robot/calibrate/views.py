@@ -83,10 +83,11 @@ def touches(run: Run, found: Found | None, least: int) -> str:
     chart = ""
     if run.course:
         counts = np.array([0.0, *(each[0] for each in run.course)])
-        after, bound = (1000.0 * np.array([run.expected[0], *(each[i] for each in run.course)]) for i in (1, 2))
+        after = 1000.0 * np.array([run.expected[0], *(each[1] for each in run.course)])
+        bound = 1000.0 * np.array([each[2] for each in run.course])
         chart = with_legend(
             (Row("tip off by, mm", shows=(0.0,)),),
-            (Curve("expected", counts, [after]), Curve("95 % stay below", counts, [bound])),
+            (Curve("expected", counts, [after]), Curve("95 % stay below", counts[1:], [bound])),
             "Expected error of the tip after each touch",
             "touches",
             whole=len(run.q),

@@ -1,0 +1,92 @@
+"""*Calibrate by touching* in a browser, with a simulated arm that is connected."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from page import Tab
+from playwright.sync_api import expect
+
+import kin
+from kin.calibration.chain import Chain
+from kin.calibration.fit import Touches
+from kin.calibration.fixtures import TouchBoard, TouchFixture
+from tests.kin.calibration.simulated import HOBBY, random_errors, touch, true_sockets
+
+pytestmark = [pytest.mark.browser, pytest.mark.full]
+
+SO101 = kin.get_robot("so101")
+SHEET = TouchFixture([TouchBoard.sheet("A4")])
+COUNT, BAD = 14, 3
+PROGRAM = re.compile(r'^import kin\n+page = kin\.connect\("(\S+)",\s"(\S+)"\)$', re.MULTILINE)
+
+
+def simulated() -> np.ndarray:
+    """What the joints of an arm with errors read in the postures that the page asks for; one reading is wrong."""
+    plan, rng = kin.calibration.touch_postures(SO101, SHEET, COUNT), np.random.default_rng(4)
+    chain = Chain(SO101)
+    spots = true_sockets(SHEET, plan.places, rng)
+    found = touch(chain, random_errors(chain, rng), HOBBY, Touches(plan.q, plan.sockets), SHEET, spots, rng)
+    assert len(found) == COUNT
+    found.q[BAD, 2] += np.radians(12.0)
+    return found.q
+
+
+@pytest.mark.parametrize("size", ["desktop", "phone"])
+def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.FixtureRequest, size: str) -> None:
+    tab: Tab = request.getfixturevalue(size)
+    page, dark = tab.page, size == "phone"
+    tab.set_dark(dark)
+    tab.open("Program")
+    page.get_by_role("button", name="Connect a program").click()
+    said = PROGRAM.search(page.locator(".kb-live").inner_text())
+    assert said is not None
+    tab.open("Robot")
+    page.locator('[data-cell="start"]').select_option("so101")
+    expect(page.locator('[data-cell="0 name"]')).to_have_value("shoulder pan")
+    folder = page.get_by_role("button", name="Calibrate by touching", exact=True)
+    folder.click()
+    tab.type_number("Touches", str(COUNT))
+    propose = page.get_by_role("button", name="Propose postures")
+    propose.scroll_into_view_if_needed()
+    tab.screenshot(f"calibrate-{size}-begin")
+    propose.click()
+    table = page.get_by_role("table", name="Touches")
+    with kin.connect(*said.groups(), name="arm.py") as arm:
+        for i, q in enumerate(simulated()):
+            shown = page.locator(f'[data-calibrate-posture="{i + 1}"]')
+            expect(shown).to_be_visible()
+            arm.measured = q
+            expect(shown).to_contain_text("The connected arm’s tip is")
+            if i in (1, 9):
+                shown.scroll_into_view_if_needed()
+                tab.screenshot(f"calibrate-{size}-posture-{i + 1}")
+            page.get_by_role("button", name="Read", exact=True).click()
+            expect(table.get_by_role("row")).to_have_count(i + 2)
+            if i < COUNT - 1:
+                page.get_by_role("button", name="Next", exact=True).click()
+        arm.measured = None
+    found = page.locator('[data-calibrate="found"]')
+    expect(table).to_contain_text("left out")
+    expect(found).to_contain_text(f"ouch {BAD + 1}")
+    expect(found).to_contain_text(f"{COUNT - 1} of {COUNT} touches were used")
+    table.scroll_into_view_if_needed()
+    tab.screenshot(f"calibrate-{size}-touches")
+    found.scroll_into_view_if_needed()
+    tab.screenshot(f"calibrate-{size}-found")
+    page.reload()
+    tab.open("Robot")
+    folder.click()
+    expect(table.get_by_role("row")).to_have_count(COUNT + 1)
+    expect(found).to_contain_text(f"{COUNT - 1} of {COUNT} touches were used")
+    page.get_by_role("button", name="Use this arm").click()
+    expect(tab.status).to_contain_text("SO-101 is calibrated")
+    expect(page.locator('[data-cell="1 name"]')).to_have_value("shoulder pan, tilt")
+    tab.top()
+    tab.screenshot(f"calibrate-{size}-used")
+    page.get_by_role("button", name="Undo").click()
+    expect(table.get_by_role("row")).to_have_count(COUNT + 1)
+    page.get_by_role("button", name="Stop", exact=True).click()
+    tab.set_dark(False)
