@@ -49,7 +49,7 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
     folder = page.get_by_role("button", name="Calibrate by touching", exact=True)
     folder.click()
     tab.type_number("Touches", str(COUNT))
-    propose = page.get_by_role("button", name="Propose postures")
+    propose = page.get_by_role("button", name="Propose", exact=True)
     propose.scroll_into_view_if_needed()
     tab.screenshot(f"calibrate-{size}-begin")
     propose.click()

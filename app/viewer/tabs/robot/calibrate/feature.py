@@ -184,11 +184,11 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         if s.wanted:
             cancel = Button("Cancel", self.event(self.on_cancel), key="cancel")
             return [about, Html(views.busy, key="busy"), cancel]
-        acts = {"Propose postures": self.event(self.on_plan), "Save the sheet": self.event(self.on_print)}
-        offered = tuple(name for name in acts if s.kind == "sheet" or name != "Save the sheet")
+        acts = {"Propose": self.event(self.on_plan), "Save sheet": self.event(self.on_print)}
+        offered = tuple(name for name in acts if s.kind == "sheet" or name != "Save sheet")
         hint = "Where to touch, and what it is expected to bring; the sheet to print, as SVG"
         fields = [Control("kind"), *size, *map(Control, ("places", "plane", "count"))]
-        return [about, *fields, Buttons("Begin", acts, hint, offered, key="begin")]
+        return [about, *fields, Buttons("Postures", acts, hint, offered, key="begin")]
 
     def _run_nodes(self, run: Run) -> list[Node]:
         f, s = self.read, self.read.settings

@@ -213,12 +213,12 @@ def begun(page: Page, run: Run) -> None:
 
 
 def test_postures_are_proposed_and_the_sheet_is_saved(page: Page) -> None:
-    page.set("Begin", "Save the sheet")
+    page.set("Postures", "Save sheet")
     assert page.saved["touch-sheet-A3.svg"].startswith(b"<svg")
     page.set("Touch", "two sockets of a bar")
     assert page.feature.settings.length == 0.15
     page.set("Touches", 3)
-    page.set("Begin", "Propose postures")
+    page.set("Postures", "Propose")
     page.until(lambda: page.feature.settings.run)
     assert len(page.run.q) == 3
     assert (page.run.what.kind, page.run.what.length, page.run.what.places) == ("bar", 0.15, 1)
@@ -311,7 +311,7 @@ def test_a_wrong_touch_is_named(page: Page, run: Run, read: list[tuple[float, ..
 def test_postures_that_cannot_be_touched_are_said(page: Page) -> None:
     page.set("Touch", "two sockets of a bar")
     page.set("Distance of the sockets, mm", 2000.0)
-    page.set("Begin", "Propose postures")
+    page.set("Postures", "Propose")
     page.until(lambda: page.page.notices)
     assert page.page.notices[-1].title == "No postures were found"
     assert "socket" in page.page.notices[-1].detail
