@@ -116,11 +116,12 @@ class Case:
 
 
 def _edited(edit: Edit, robot: Robot) -> Robot | None:
-    """The arm with the change; None if it makes no arm."""
+    """The arm with the change; None if it makes no arm, or other joints: a slide is not taken for a hinge."""
     try:
-        return edit.apply(Tables.of(robot)).robot(0, robot)
+        arm = edit.apply(Tables.of(robot)).robot(0, robot)
     except KinematicsError:
         return None
+    return arm if np.array_equal(arm.revolute, robot.revolute) else None
 
 
 def _sign(case: Case) -> Clauses:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import kin
-from app.exercises import ExerciseFileError, Verdict, parse_exercise
-from app.exercises.mistakes import ROWS
+from app.exercises import ExerciseFileError, Variant, Verdict, parse_exercise
+from app.exercises.expressions import Expression
+from app.exercises.mistakes import ROWS, Case
 from app.exercises.questions import RELATED, WRITTEN
 from kin import Robot
 from kin.transforms import Array
@@ -178,6 +179,15 @@ def test_a_count_has_no_mistaken_model() -> None:
     assert judged([0.0], ["round(2*cos(t1))"], unit="count").cause == ""
 
 
+def test_no_mistake_turns_a_slide_into_a_hinge() -> None:
+    scara = kin.get_robot("scara")
+    case = Case(Variant("one", scara, scara.q_home), (Expression("x"),), Units())
+    arms = [mistaken.robot for row in ROWS.values() for _, mistaken in row.mistaken(case)]
+    assert len(set(arms)) >= 8
+    assert all(arm.revolute.tolist() == scara.revolute.tolist() for arm in arms)
+    assert all(np.isfinite(arm.lower).all() for arm in arms), "it has a place in the scene"
+
+
 def test_a_mistake_without_a_configuration_is_none() -> None:
     """Twice the length has no angle: the other mistakes are still found."""
     q = 'q = ["acos(p / (500*mm))", "t2"]'
@@ -187,7 +197,7 @@ def test_a_mistake_without_a_configuration_is_none() -> None:
 
 def test_the_tool_point_in_a_formula_is_given() -> None:
     """Who reads x and y on the page makes no mistake in the table."""
-    assert judged([1.0 + math.hypot(*planar(T1, 0.0))], ["1 + hypot(x, y)"]).cause == ""
+    assert judged([2.0], ["1 + hypot(x, y)"]).cause == "", "the elbow is 1 m from the base"
     assert judged([1.0 + sum(planar(T1, T2))], ["1 + hypot(x, y)"]).cause == "sum"
 
 
