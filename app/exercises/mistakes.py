@@ -30,7 +30,7 @@ from kin.transforms import Array
 from kin.units import Units, general
 
 CHANCES = (0.02, 0.01)  # that a random number within ± 50 % of the answer is explained by one mistake, by a pair
-NEAR = 0.5  # of the answer: where random numbers are
+NEAR, BESIDE_ZERO = 0.5, 10.0  # where random numbers are, of the answer, and of its tolerance if it is about zero
 _SYMBOLS = {"theta": "θ", "d": "d", "a": "a", "alpha": "α"}
 _DEGREE = CONSTANTS["deg"]
 
@@ -390,7 +390,8 @@ class Models:
         tolerances = np.array(self.tolerances)
         if len(tolerances) > 1:
             return tolerances  # all of several numbers agree by chance far too rarely
-        most = NEAR * abs(float(self._right[0]))
+        size, zero = abs(float(self._right[0])), 2.0 * tolerances[0]
+        most = NEAR * size if size > zero else BESIDE_ZERO * tolerances[0]
         values = sorted(float(one.values[0]) for one in models if self._gaps(one.values, self._right)[0] <= most)
         different = sum(b - a > tolerances[0] for a, b in zip([-math.inf, *values], values, strict=False))
         return np.asarray(np.minimum(tolerances, chance * most / max(different, 1)))

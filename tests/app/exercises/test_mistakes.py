@@ -168,6 +168,12 @@ def test_nothing_is_named_if_two_mistakes_lead_there() -> None:
     assert judged([0.8], ["p"]).cause == RELATED, "half or twice the value is said as such"
 
 
+def test_a_mistake_beside_zero_is_named() -> None:
+    flat, vary = ["cos(r)"], "r = { choose = [90], unit = 'deg' }"
+    assert judged([math.cos(math.pi / 4)], flat, vary=vary).cause == "double angle"
+    assert judged([0.7], flat, vary=vary).cause == ""
+
+
 def test_the_reason_in_the_file_goes_first() -> None:
     more = 'mistakes = [{ value = 1.8, reason = "That is the diameter." }]'
     verdict = judged([1.8], ["1 + p"], more=more)
