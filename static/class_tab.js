@@ -39,17 +39,13 @@
     if (button) button.parentElement.querySelector("code").textContent = location.href;
   }, true);
 
-  // A student's answers: kept in the tab until the service has taken them, and sent again over a new connection. What is
-  // typed and not yet sent is kept too, and is there again when the page is.
+  // A student's answers: kept in the tab until the service has taken them, and sent again over a new connection.
 
   const ANSWERS = "kinboard-answers";
-  const DRAFT = "kinboard-draft";
   const read = (name, none) => { try { return JSON.parse(sessionStorage.getItem(name)) ?? none; } catch { return none; } };
   const keep = (name, value) => { try { sessionStorage.setItem(name, JSON.stringify(value)); } catch { /* only this page has it */ } };
   let answers = read(ANSWERS, []); // { id, place, kind, value, since }
-  let draft = read(DRAFT, { place: "", cells: {} });
   let sent = new Set(); // ids of answers that were sent over this connection
-  let filled = null; // the block of the question that has the draft
   const member = () => $("[data-class-bar]:not([data-class-bar=closed])");
   const student = () => $("[data-class-bar]:not([data-class-bar=teacher], [data-class-bar=closed])");
   /** The exercise on show and its numbers. */
@@ -79,24 +75,6 @@
     deliver();
     setTimeout(tell, WAITING);
   });
-  addEventListener("input", (event) => {
-    const cell = event.target.closest?.("[data-exercises=question] [data-cell]");
-    if (!cell || !student()) return;
-    if (draft.place !== place()) draft = { place: place(), cells: {} };
-    draft.cells[cell.dataset.cell] = cell.value;
-    draft.base = cell.defaultValue;
-    keep(DRAFT, draft);
-  });
-  function fill() {
-    const block = $("[data-exercises=question]");
-    if (!block || block === filled || draft.place !== place() || !student()) return;
-    filled = block;
-    if (block.dataset.form === "frame" && block.querySelector("[data-cell]")?.defaultValue !== draft.base) return; // the ghost was dragged meanwhile
-    for (const cell of block.querySelectorAll("[data-cell]:not([readonly])")) {
-      const text = draft.cells[cell.dataset.cell];
-      if (text !== undefined && text !== cell.value) cell.value = text;
-    }
-  }
 
   // The connection: a browser notices late that nothing comes through any more, and a page must not look ready then. What
   // comes from the service shows that it is there. It is asked for only while that is in doubt: after something was sent
@@ -148,8 +126,8 @@
   setInterval(look, EVERY);
 
   // A new connection counts from the beginning.
-  addEventListener("kinboard-connect", () => { opened = ""; sent = new Set(); filled = null; });
+  addEventListener("kinboard-connect", () => { opened = ""; sent = new Set(); });
   viserPage.watch(follow);
   viserPage.watch(measure);
-  viserPage.watch(() => { fill(); deliver(); });
+  viserPage.watch(deliver);
 })();

@@ -18,6 +18,7 @@
   function press(button) {
     if (button.ariaDisabled === "true") return;
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
+    if (kind === "restart") keepDrafts([]);
     if (kind === "check") check(button);
     else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")), ...(key === undefined ? [] : [key]));
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
@@ -56,6 +57,43 @@
     if (event.target.dataset.cell === undefined) check(event.target);
     else event.target.closest("fieldset").querySelector("[data-guide-do=fields]")?.click();
   }, true);
+
+  // What is typed and not yet sent is there again when the page is, unless the service says something else by now.
+  const DRAFTS = "kinboard-drafts";
+  const MOST_DRAFTS = 20; // questions
+  const TYPED = ":is(input, textarea)[data-cell]:not([readonly])";
+  let drafts = []; // [question, { cell: [what is typed, what the service said before] }], the newest first
+  try { drafts = JSON.parse(sessionStorage.getItem(DRAFTS)) ?? []; } catch { /* nothing was kept */ }
+  function keepDrafts(now) {
+    drafts = now.slice(0, MOST_DRAFTS);
+    try { sessionStorage.setItem(DRAFTS, JSON.stringify(drafts)); } catch { /* only this page has it */ }
+  }
+  /** The question of a typed cell, with its numbers; undefined: it is no answer. */
+  function questionOf(cell) {
+    const asked = cell.closest("[data-question]");
+    const lesson = document.querySelector("[data-guide=goal]")?.dataset.lesson;
+    return asked ? `${lesson} ${asked.dataset.question} ${asked.querySelector("legend")?.textContent}` : cell.closest("[data-of]")?.dataset.of;
+  }
+  const draftOf = (question) => drafts.find(([each]) => each === question)?.[1];
+  addEventListener("input", ({ target }) => {
+    const question = target.matches?.(TYPED) ? questionOf(target) : undefined;
+    if (question === undefined) return;
+    const typed = { ...draftOf(question), [target.dataset.cell]: [target.value, target.defaultValue] };
+    keepDrafts([[question, typed], ...drafts.filter(([each]) => each !== question)]);
+  });
+  let filled = new WeakMap(); // cell → what the service said when it was looked at
+  function fill() {
+    for (const cell of document.querySelectorAll(`.kb-question ${TYPED}`)) {
+      if (filled.get(cell) === cell.defaultValue || cell.value !== cell.defaultValue) continue;
+      filled.set(cell, cell.defaultValue);
+      const [text, before] = draftOf(questionOf(cell))?.[cell.dataset.cell] ?? [];
+      if (text === undefined || before !== cell.defaultValue || text === cell.value) continue;
+      cell.value = text;
+      cell.dispatchEvent(new Event("input", { bubbles: true })); // static/parts.js keeps what is typed
+    }
+  }
+
+  addEventListener("kinboard-connect", () => { filled = new WeakMap(); });
 
   // Focus: kept when the server sends the block again; where its control is gone, the question or the block gets it.
   const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument", "data-cell", "data-guide-change"];
@@ -127,6 +165,7 @@
       if (from.getClientRects().length) from.scrollIntoView({ block: "start" });
     }
   }
+  viserPage.watch(fill);
   viserPage.watch(showWords);
   viserPage.watch(reveal);
   viserPage.watch(restore);

@@ -127,6 +127,26 @@ def test_a_lesson_from_its_first_step_to_its_check(desktop: Tab, lesson: type[Le
     tab.choose("Lesson", "None")
 
 
+def test_a_half_typed_answer_is_there_after_a_reload(desktop: Tab) -> None:
+    tab, page = desktop, desktop.page
+    tab.select(PIONEER)
+    tab.choose_lesson("Equations")
+    page.get_by_role("button", name="Step 2").press("Enter")
+    field, said = page.locator('[data-question="2"] input'), page.locator('[data-feedback="2"]')
+    field.fill("6")
+    field.press("Enter")
+    expect(said).to_contain_text("Too small.")
+    field.fill("7")
+    page.reload()
+    expect(said).to_contain_text("Too small.")
+    expect(field).to_have_value("7")
+    field.press("Enter")
+    expect(said).to_contain_text("nearer than 6 mm, your answer before.")
+    page.reload()
+    expect(field).to_have_value("7")
+    tab.choose("Lesson", "None")
+
+
 def test_the_keyboard_keeps_its_place(desktop: Tab) -> None:
     tab, page = desktop, desktop.page
     tab.select(PIONEER)
