@@ -1,8 +1,8 @@
 """The texts of a lesson: goal, steps and check in a TOML file beside its code.
 
-The file declares the facts that its texts and expressions use, each with a sentence on what it is. The lesson
-computes them for an arm; `kinboard check` reads the file without it. Questions are those of exercises, with the
-same fields::
+The texts and expressions use facts that the lesson computes for an arm: the attributes of a class in ``lesson.py``
+beside the file (`facts_of`), or names that the file declares, each with a sentence on what it is. `kinboard check`
+reads the file without running the lesson. Questions are those of exercises, with the same fields::
 
     goal = "You can …"
 
@@ -46,10 +46,12 @@ are left out where it does not hold.
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import kin
 from app.exercises.contract import Kind
@@ -65,6 +67,8 @@ _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
 MOST_JOINTS = 12
 POINTS = ("tool", "end", "target")  # of the tool at the pose of a step, or at its end, and the step's target
 NO_PREVIEW = "nowhere"
+FACTS, DRAWN = "AskedFacts", ("poses", "leads")  # the class that lessons derive from, and what is no fact of it
+NO_FACTS: Mapping[str, str] = MappingProxyType({})
 _NONE = ""  # the name of no pose and of no figure
 
 
@@ -156,14 +160,17 @@ class _Fields(Fields):
     declared = "[facts] or [words]"
 
 
-def parse_lesson(text: str, file: str = "lesson") -> LessonText:
+def parse_lesson(text: str, file: str = "lesson", facts: Mapping[str, str] = NO_FACTS) -> LessonText:
     """The texts of a lesson in TOML.
+
+    Args:
+        facts: those that its code has, as `facts_of` finds them; the file may declare more.
 
     Raises:
         ExerciseFileError: naming the file, the field, the value and what would be valid.
     """
     data = toml_of(text, file)
-    facts = _facts(Fields(file, data.get("facts", {}), "facts."))
+    facts = {**facts, **_facts(Fields(file, data.get("facts", {}), "facts."))}
     found: list[Expression] = []
     aliases = _Fields(file, data.get("words", {}), "words.", frozenset(facts), found)
     words = {name: aliases.words(name) for name in aliases.table}
@@ -184,7 +191,20 @@ def parse_lesson(text: str, file: str = "lesson") -> LessonText:
 
 def load_lesson(path: Path | str) -> LessonText:
     """The texts of a file; raises `ExerciseFileError`."""
-    return parse_lesson(text_of(path), str(path))
+    return parse_lesson(text_of(path), str(path), facts_of(Path(path).with_name("lesson.py")))
+
+
+def facts_of(module: Path) -> dict[str, str]:
+    """The facts that a lesson's code has, with their docstrings: public attributes of its `AskedFacts`."""
+    if not module.exists():
+        return {}
+    return {
+        one.name: ast.get_docstring(one) or ""
+        for each in ast.parse(module.read_text(encoding="utf-8")).body
+        if isinstance(each, ast.ClassDef) and any(getattr(base, "id", "") == FACTS for base in each.bases)
+        for one in each.body
+        if isinstance(one, ast.FunctionDef) and not one.name.startswith("_") and one.name not in DRAWN
+    }
 
 
 def lesson_files() -> dict[str, Path]:

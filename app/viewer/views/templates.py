@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 _ENVIRONMENT = Environment(
-    loader=FileSystemLoader(Path(__file__).parent / "templates"),
+    loader=FileSystemLoader([Path(__file__).parent / "templates", Path(__file__).parents[1] / "lessons"]),
     autoescape=True,
     undefined=StrictUndefined,
     trim_blocks=True,
@@ -40,6 +40,11 @@ def render(name: str, /, **values: object) -> str:
     template.
     """
     return _template(name).render(values)
+
+
+def part(name: str, macro: str, /, **values: object) -> str:
+    """A macro of a template with these values, as `render`: a lesson has one file ``lessons/<key>/panel.html``."""
+    return "".join([getattr(_template(name).module, macro)(**values)])
 
 
 @cache

@@ -115,6 +115,19 @@ def test_what_the_lesson_does_not_compute_is_named() -> None:
         outline_of("velocity", robot, UNITS[0], LessonFacts(known.numbers, known.functions, known.words))
 
 
+def test_facts_are_the_attributes_of_the_lessons_class(tmp_path: Path) -> None:
+    known = load_lesson(FILES["screws"]).facts
+    assert known["slides"] == "The first joint that slides; 0: none does."
+    assert all(known.values()), "each has a docstring"
+    assert not {name for name in known if name.startswith("_")} | {"poses", "leads"} & known.keys()
+    for name in ("lesson.py", "lesson.toml"):
+        text = FILES["screws"].with_name(name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text.replace("row {slides}", "row {slide}"), encoding="utf-8")
+    with pytest.raises(ExerciseFileError, match=r"steps\[2\]\.shown.*got '\{slide\}'.*slides") as caught:
+        load_lesson(tmp_path / "lesson.toml")
+    assert str(tmp_path) in str(caught.value)
+
+
 @pytest.mark.parametrize("key", FILES)
 def test_kinboard_check_reads_the_file(key: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(FILES[key])]) == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TypeVar
@@ -68,6 +68,37 @@ class LessonFacts:
     shapes: Mapping[str, SemiAxis | Cosine] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, eq=False)
+class AskedFacts:
+    """The facts of a lesson's file as attributes of a class: its public properties, and its methods of numbers.
+
+    The docstring of each says what it is; nothing lists them again (`app.exercises.lesson_text.facts_of`). Numbers
+    are in radians, metres and SI units, texts in the reader's units.
+    """
+
+    robot: Robot
+    units: Units
+
+    @property
+    def poses(self) -> Mapping[str, Pose]:
+        """As in `LessonFacts`."""
+        return {}
+
+    @property
+    def leads(self) -> Mapping[str, Lead | None]:
+        """As in `LessonFacts`."""
+        return {}
+
+    def listed(self, names: Iterable[str]) -> LessonFacts:
+        """Those of these names."""
+        found = {name: getattr(self, name) for name in names}
+        words = {name: value for name, value in found.items() if isinstance(value, str)}
+        functions = {name: value for name, value in found.items() if callable(value)}
+        rest = {name: value for name, value in found.items() if name not in {*words, *functions}}
+        numbers = {name: x if isinstance(x, Quantity) else float(x) for name, x in rest.items()}
+        return LessonFacts(numbers, functions, words, self.poses, leads=self.leads)
+
+
 @cache
 def texts_of(lesson: str) -> LessonText:
     """The texts of a lesson."""
@@ -79,9 +110,11 @@ def written_example(lesson: str) -> WorkedText | None:
     return texts_of(lesson).example if lesson in lesson_files() else None
 
 
-def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts) -> Outline:
+def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts | AskedFacts) -> Outline:
     """The outline of a lesson with a file; raises `ExerciseFileError` for what the facts do not have."""
     text = texts_of(lesson)
+    if isinstance(facts, AskedFacts):
+        facts = facts.listed(text.facts)
     names = {*facts.numbers, *facts.functions, *facts.words}
     if missing := sorted(text.facts.keys() - names):
         raise ExerciseFileError(text.file, "facts", missing[0], f"one of {', '.join(sorted(names))}")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from app.viewer.declared.scene import Color, Node, arrows, axes, mesh
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import GREY, clear_of
-from app.viewer.lessons.screws.facts import ScrewsFacts
-from app.viewer.lessons.screws.product import foot
 from app.viewer.lessons.velocity.drawing import ring_arrow, wxyz_along
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
+from kin import Robot
+from kin.dh import Screws
 from kin.transforms import Array
 from kin.units import Units
 
@@ -24,13 +26,35 @@ OPACITY = 0.45
 _SHORT = 1e-3  # relative; shorter arrows are not drawn
 
 
-def tips(facts: ScrewsFacts) -> Array:
+class Drawn(Protocol):
+    """What is drawn of the facts of the lesson."""
+
+    @property
+    def robot(self) -> Robot: ...
+    @property
+    def axes(self) -> tuple[Array, Array]: ...
+    @property
+    def screws(self) -> Screws: ...
+    @property
+    def origin(self) -> Array: ...
+    @property
+    def chosen(self) -> int: ...
+    @property
+    def ghost(self) -> Array | None: ...
+
+
+def foot(S: Array) -> Array:
+    """The point ``(3,)`` of a revolute joint's axis nearest to the origin; the origin for a prismatic joint."""
+    return np.cross(S[:3], S[3:])
+
+
+def tips(facts: Drawn) -> Array:
     """The ends of the axes ``(n, 3)``."""
     r = body(facts.robot).radius
     return spread_tips(*facts.axes, REACH * r, APART * r)
 
 
-def scene(facts: ScrewsFacts, figure: FigureNodes, units: Units, asked: bool = False) -> list[Node]:
+def scene(facts: Drawn, figure: FigureNodes, units: Units, asked: bool = False) -> list[Node]:
     """All drawings; only the axes if the numbers of the screws are asked."""
     with figure:
         ends = tips(facts)
@@ -42,7 +66,7 @@ def scene(facts: ScrewsFacts, figure: FigureNodes, units: Units, asked: bool = F
     return nodes
 
 
-def _axes(facts: ScrewsFacts, figure: FigureNodes, ends: Array) -> list[Node]:
+def _axes(facts: Drawn, figure: FigureNodes, ends: Array) -> list[Node]:
     r, nodes = body(facts.robot).radius, []
     for i, (point, z, tip) in enumerate(zip(*facts.axes, ends, strict=True)):
         color = joint_color(i)
@@ -55,7 +79,7 @@ def _axes(facts: ScrewsFacts, figure: FigureNodes, ends: Array) -> list[Node]:
     return nodes
 
 
-def _chosen(facts: ScrewsFacts, figure: FigureNodes, ends: Array, units: Units) -> list[Node]:
+def _chosen(facts: Drawn, figure: FigureNodes, ends: Array, units: Units) -> list[Node]:
     """Where the numbers of one screw come from, seen from their own frame.
 
     The perpendicular from its origin to the axis, and there the velocity v of a point that moves along.

@@ -19,11 +19,18 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.outline import Choice, Number
-from app.viewer.lessons.screws import views
-from app.viewer.lessons.screws.drawing import spread_tips
-from app.viewer.lessons.screws.product import Form, foot, origin_of, partial, product, seen
-from app.viewer.lessons.screws.questions import far_joint, outline
-from app.viewer.lessons.screws.settings import FORMS, PLACES, joints
+from app.viewer.lessons.screws import lesson as views
+from app.viewer.lessons.screws.drawing import foot, spread_tips
+from app.viewer.lessons.screws.lesson import (
+    FORMS,
+    PLACES,
+    Form,
+    ScrewsLesson,
+    far_joint,
+    joints,
+    partial,
+    product,
+)
 from app.viewer.server import ViewerServer
 from kin.units import Units
 
@@ -72,15 +79,14 @@ def test_the_screws_are_those_of_the_axes(robot: kin.Robot) -> None:
         assert np.allclose(found.S[:3], J[3:], atol=1e-12)
         at_tool = found.S[3:] + np.cross(found.S[:3].T, T[:3, 3]).T
         assert np.allclose(at_tool, J[:3], atol=1e-12)
-        assert np.array_equal(origin_of(found, "space"), np.eye(4))
-        assert np.allclose(origin_of(found, "body"), T, atol=1e-12)
+        assert np.allclose(found.M, T, atol=1e-12)
 
 
 @pytest.mark.parametrize("form", BOTH)
 def test_the_table_and_both_products_agree_with_the_core(robot: kin.Robot, form: Form) -> None:
     zero = kin.dh.screws(robot)
     q = robot.random_q(np.random.default_rng(4))
-    columns = seen(zero, form)
+    columns = zero.S if form == "space" else zero.B
     html = views.table_html(robot, columns, form, False, 0)
     assert shown(html, "data-s") == pytest.approx(columns.T.ravel(), abs=0.5001e-3)
     assert re.findall(r"data-pitch>(.)<", html) == ["0" if turns else "∞" for turns in robot.revolute]
@@ -105,7 +111,7 @@ def test_the_table_and_both_products_agree_with_the_core(robot: kin.Robot, form:
 
 def test_the_body_form_asks_for_a_length_that_is_not_zero(robot: kin.Robot) -> None:
     """Where any axis is beside the tool point; the length in the space form is a known mistake."""
-    step = next(step for step in outline(robot, UNITS).steps if step.title == "Body form")
+    step = next(step for step in ScrewsLesson.outline(robot, UNITS).steps if step.title == "Body form")
     assert isinstance(step.question, Number)
     points, z = axes_at(robot, np.zeros(robot.n))
     tool = kin.fk(robot, np.zeros(robot.n))[:3, 3]
@@ -149,7 +155,7 @@ def test_axes_of_one_line_have_ends_apart() -> None:
 
 
 def test_the_questions_by_another_way(robot: kin.Robot) -> None:
-    made = outline(robot, UNITS)
+    made = ScrewsLesson.outline(robot, UNITS)
     asked = dict(made.questions())
     frames = np.concatenate([robot.T_world_base[None], kin.link_frames(robot, np.zeros(robot.n))])
 

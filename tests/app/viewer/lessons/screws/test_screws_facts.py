@@ -11,8 +11,7 @@ from arms import CLASSICS
 
 import kin
 from app.viewer.arm import Arm
-from app.viewer.lessons.screws.facts import ScrewsFacts
-from app.viewer.lessons.screws.settings import ScrewsSettings
+from app.viewer.lessons.screws.lesson import ScrewsFacts, ScrewsSettings
 
 ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
 
