@@ -17,8 +17,7 @@ from kin.postures import PostureMap
 
 SIZE = 620.0  # drawing units along the longer side
 PIXELS = 1000  # about, along a side of the PNG
-MOST = 16  # postures that have a colour of their own
-LINES = {"singular": "#d55e00", "limit": "#ffffff"}
+LINES = {"singular": "#d55e00", "limit": INK}
 
 
 class Format(NamedTuple):
@@ -29,16 +28,16 @@ class Format(NamedTuple):
     write: Callable[[PostureMap], bytes]
 
 
-def colours(counts: NDArray[np.int16]) -> NDArray[np.uint8]:
-    """The colours of numbers of postures ``(…, 3)``: dark is few, bright is many, white is none."""
-    place = np.minimum(counts, MOST) * ((len(SCALE) - 1) / MOST)
+def colours(counts: NDArray[np.int16], most: int) -> NDArray[np.uint8]:
+    """The colours of numbers of postures up to `most` ``(…, 3)``: dark is few, bright is many, white is none."""
+    place = counts * ((len(SCALE) - 1) / max(most, 1))
     mixed = np.stack([np.interp(place, range(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=-1)
     return np.where(counts[..., None] == 0, 255.0, mixed).astype(np.uint8)
 
 
 def _pixels(found: PostureMap) -> NDArray[np.uint8]:
     """A pixel for each node ``(rows, columns, 4)``, the largest y first."""
-    image = colours(found.counts.T[::-1])
+    image = colours(found.counts.T[::-1], int(found.counts.max()))
     return np.concatenate([image, np.full_like(image[..., :1], 255)], axis=-1)
 
 
@@ -133,7 +132,9 @@ def _key(found: PostureMap, left: float, top: float) -> list[str]:
     """The colours of the numbers that occur."""
     parts = [f'<text x="{left:.0f}" y="{top + 10.0:.0f}" font-size="12">postures</text>']
     numbers = np.unique(found.counts)
-    for k, (number, colour) in enumerate(zip(numbers.tolist(), colours(numbers).tolist(), strict=True)):
+    for k, (number, colour) in enumerate(
+        zip(numbers.tolist(), colours(numbers, int(numbers[-1])).tolist(), strict=True)
+    ):
         at = top + 20.0 + 20.0 * k
         parts.append(
             f'<rect x="{left:.0f}" y="{at:.0f}" width="14" height="14" fill="rgb{tuple(colour)}" stroke="{SOFT}"/>'

@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -285,25 +286,38 @@ class _Solver:
         """The arm without its locked joints."""
         return self.movable.arm
 
-    def all(self, T: Array) -> Array:
-        """All configurations of poses ``(k, 4, 4)`` without limits ``(k, m, n)``, each once; else NaN."""
+    def all(self, T: Array, careful: bool = False) -> Array:
+        """All configurations of poses ``(k, 4, 4)`` without limits ``(k, m, n)``, each once; else NaN.
+
+        `careful`: look for what the batch kernels may miss, which takes milliseconds for each pose.
+        """
         self.cancel()
-        rows = self._position(T) if self.form is None else self._rows(self.form, T)
+        rows = self._position(T) if self.form is None else self._rows(self.form, T, careful)
         return self._once(rows)
 
-    def counts(self, T: Array, progress: Callable[[float], object] = lambda _: None) -> tuple[Counts, Counts]:
-        """The numbers of postures ``(k,)`` at poses: without limits, and inside them."""
+    def counts(
+        self, T: Array, progress: Callable[[float], object] = lambda _: None, careful: bool = False
+    ) -> tuple[Counts, Counts]:
+        """The numbers of postures ``(k,)`` at poses: without limits, and inside them; `careful` as in `all`."""
         found: list[tuple[Counts, Counts]] = [(np.zeros(0, np.int16), np.zeros(0, np.int16))]
         parts = np.split(T, range(_AT_ONCE, len(T), _AT_ONCE)) if len(T) else []
         with ThreadPoolExecutor(_THREADS) as threads:  # the kernels let other threads run
-            for each in threads.map(self._count, parts):
+            for each in threads.map(partial(self._count, careful=careful), parts):
                 found.append(each)
                 progress((len(found) - 1) / len(parts))
         every, inside = zip(*found, strict=True)
         return np.concatenate(every), np.concatenate(inside)
 
-    def _count(self, T: Array) -> tuple[Counts, Counts]:
-        rows = self.all(T)
+    def lonely(self, every: Counts) -> NDArray[np.intp]:
+        """The nodes of a map ``(a, b)`` whose number is that of none beside them, where some may be missed."""
+        if self.form is None or self.form.named:
+            return np.empty(0, dtype=np.intp)
+        padded = np.pad(every, 1, constant_values=-1)
+        beside = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
+        return np.flatnonzero(np.all([other != every for other in beside], axis=0))
+
+    def _count(self, T: Array, careful: bool = False) -> tuple[Counts, Counts]:
+        rows = self.all(T, careful)
         there = ~np.isnan(rows[..., 0])
         inside = there & self._inside(rows)
         return there.sum(axis=1, dtype=np.int16), inside.sum(axis=1, dtype=np.int16)
@@ -335,11 +349,13 @@ class _Solver:
             J = np.linalg.svd(task_rows(self.arm, generic_q(self.arm), self.task))[0][:, : J.shape[-1]].T @ J
         return np.where(np.linalg.det(J) > 0.0, 2, 1).astype(np.int16)
 
-    def _rows(self, form: ClosedForm, T: Array) -> Array:
+    def _rows(self, form: ClosedForm, T: Array, careful: bool) -> Array:
         if not form.named:
             T = T @ _TURNED
         rows = np.empty((len(T), len(form.branches), self.arm.n))
         form.kernels.many(form.kernels.params, T, np.array([math.nan]), self.arm.q_home.copy(), rows)
+        for each, q in zip(T, rows, strict=True) if careful else ():
+            form.add_missing(each, self.arm.q_home.copy(), q)
         rows[~self._met(rows, T)] = math.nan
         return rows
 
@@ -428,6 +444,8 @@ def _map(solver: _Solver, plane: MapPlane, nodes: int, progress: Callable[[float
     x, y = (np.linspace(*window, nodes) for window in plane.window)
     xy = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     every, inside = solver.counts(plane.poses(robot, xy), lambda part: progress(0.8 * part))
+    again = solver.lonely(every.reshape(nodes, nodes))
+    every[again], inside[again] = solver.counts(plane.poses(robot, xy[again]), careful=True)
     counts: Counts = (inside if solver.respect_limits else every).reshape(nodes, nodes)
     parts: Counts = counts if plane.joints is None else levels(xy)[:, 0].reshape(nodes, nodes)
     progress(0.8)

@@ -47,10 +47,10 @@ def test_hostile_names_are_text(found):
 def test_an_image_has_a_square_for_each_node(found):
     image = np.asarray(Image.open(io.BytesIO(FORMATS["png"].write(found))).convert("RGB"))
     assert image.shape == (1000, 1000, 3)
-    assert (image[25, 25] == colours(found.counts[0, -1:])[0]).all()
+    assert (image[25, 25] == colours(found.counts[0, -1:], 8)[0]).all()
     i, j = np.argwhere(found.counts == 8)[0]
     drawn = image[(19 - j) * 50 + 3 : (20 - j) * 50 - 3, i * 50 + 3 : (i + 1) * 50 - 3].reshape(-1, 3)
-    assert (drawn == colours(np.array([8]))[0]).all(axis=1).any()
+    assert (drawn == colours(np.array([8]), 8)[0]).all(axis=1).any()
 
 
 def test_a_table_has_a_row_for_each_node(found):

@@ -14,7 +14,7 @@ from kin.angles import apart
 from kin.axes import size
 from kin.differential.task import natural_task, task_jacobian, weight
 from kin.postures import loops
-from kin.postures.cusps import chain_of, is_staged, possible_cusps
+from kin.postures.cusps import _conditions, chain_of, is_staged, possible_cusps
 
 SQUARE = 0.5 * math.pi
 CUSPIDAL = ("gofa", "crx10ia", "jaco2", "xarm6")
@@ -53,6 +53,19 @@ def test_orthogonal_arms_are_cuspidal_beyond_four_equal_roots(d3, r2):
     assert (above.verdict, above.evidence) == ("yes", "loop")
     check_loop(orthogonal(d3, 1.2 * border, r2), above)
     assert len(possible_cusps(chain_of(orthogonal(d3, 1.002 * border, r2))))
+
+
+def test_the_conditions_of_a_cusp_are_derivatives_of_the_determinant():
+    """At any twists: the determinant of the Jacobian, and how it changes along the direction that is lost."""
+    arm = kin.Robot.from_dh([(0.2, 0.3, 1.0, 0.8), (0.1, 0.4, 0.7, -1.1), (0.3, 0.2, 0.6, 0.4)])
+    step = 1e-6 * np.eye(3)
+    for q in arm.random_q(np.random.default_rng(5), 10):
+        J = kin.jacobian(arm, q)[:3]
+        det, *along = _conditions(chain_of(arm), q[None, 1:])[0]
+        assert det == pytest.approx(np.linalg.det(J))
+        by = [(np.linalg.det(kin.jacobian(arm, q + d)[:3]) - np.linalg.det(J)) / 1e-6 for d in step]
+        adjugate = np.linalg.det(J) * np.linalg.inv(J)
+        assert np.linalg.norm(along) == pytest.approx(np.linalg.norm(by @ adjugate), rel=1e-4)
 
 
 def test_an_arm_with_a_spherical_wrist_is_judged_by_its_first_three_joints():

@@ -10,7 +10,8 @@ import pytest
 
 import kin
 from kin.differential.task import task_jacobian
-from kin.postures.maps import _labels, _letters
+from kin.postures.maps import _labels, _letters, _Solver
+from kin.postures.movable import Movable
 
 DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -51,6 +52,18 @@ def test_straight_down_is_no_exception():
     found = kin.posture_map(robot, DOWN, normal=[0.0, 1.0, 0.0], resolution=12, respect_limits=False)
     assert found.doubtful == 0
     assert set(np.unique(found.counts).tolist()) <= {0, 4, 8, 12, 16}
+
+
+def test_a_node_with_a_number_of_its_own_is_counted_with_care():
+    """A general solver misses two postures beside a singular wrist now and then."""
+    movable = Movable.of(kin.get_robot("crx10ia"), kin.JointConstraints())
+    solver = _Solver.of(movable, False, lambda: None)
+    T = DOWN.copy()
+    T[:3, 3] = 0.5577513142980353, 0.1, 1.0122153481705085
+    assert [solver.counts(T[None], careful=careful)[0][0] for careful in (False, True)] == [6, 8]
+    assert solver.lonely(np.array([[8, 8, 8], [8, 6, 8], [8, 8, 8]])).tolist() == [4]
+    named = _Solver.of(Movable.of(kin.get_robot("ur5"), kin.JointConstraints()), False, lambda: None)
+    assert named.lonely(np.array([[8, 6], [6, 8]])).tolist() == []
 
 
 def test_borders_of_a_section_are_singular():
