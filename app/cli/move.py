@@ -7,7 +7,7 @@ from argparse import Namespace
 from contextlib import closing
 from pathlib import Path
 
-from app.cli.pipes.sink import opened_sink
+from app.cli.pipes.sink import opened_output, opened_sink
 from app.cli.pipes.source import opened_source
 from app.cli.terminal import (
     Notation,
@@ -24,7 +24,6 @@ from app.cli.terminal import (
 from app.exports.motion import FORMATS, MotionFormat
 from app.exports.motion_plot import motion_plot
 from app.exports.motion_samples import with_joint_names
-from app.exports.save import opened
 from app.shared.answers.motion import motion_answer
 from kin import InputError, Robot, plan_motion
 from kin.motion import Motion, Program, parse_program, program_from_dict
@@ -142,14 +141,11 @@ def _format(arguments: Namespace) -> MotionFormat | None:
 
 def _write(path: str, motion: Motion, kind: MotionFormat, rate: float, quiet: bool) -> None:
     size = 0
-    try:
-        with opened(path) as file, closing(kind.pieces(motion, rate)) as pieces:
-            for piece in pieces:
-                file.write(piece)
-                size += len(piece)
-            file.flush()
-    except OSError as error:
-        raise InputError("--output", path, f"a file that can be written ({error})") from None
+    with opened_output(path) as file, closing(kind.pieces(motion, rate)) as pieces:
+        for piece in pieces:
+            file.write(piece)
+            size += len(piece)
+        file.flush()
     if path != "-" and not quiet:
         print(f"\n{path}: {motion.duration:.3f} s, {size} bytes")
 

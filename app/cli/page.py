@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
+from app.cli.pipes.sink import opened_output
 from app.cli.terminal import configuration, mounted_robot_of, obstacles_of, pose_of, print_json, units_of
-from app.exports.save import opened
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.takehome.page import SavedArm, web_page
 from kin import IKOptions, InputError, Obstacle, Robot, plan_motion
@@ -26,11 +26,8 @@ def run(arguments: Namespace) -> int:
     page = web_page(saved)
     file = arguments.output or f"{robot.id}.html"
     data = page.encode()
-    try:
-        with opened(file) as written:
-            written.write(data)
-    except OSError as error:
-        raise InputError("--output", file, f"a file that can be written ({error})") from None
+    with opened_output(file) as written:
+        written.write(data)
     if file != "-":
         if arguments.json:
             print_json({"file": file, "bytes": len(data)})

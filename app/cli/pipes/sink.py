@@ -60,19 +60,29 @@ class Sink:
 
 
 @contextmanager
-def opened_sink(path: str, form: Form, heading: Sequence[str]) -> Iterator[Sink]:
-    """A file that appears when it is complete, or standard output for "-"; raises `InputError`."""
-    if path == "-" and form == "npy" and sys.stdout.isatty():
-        raise InputError("--format", "npy", "csv or ndjson for a terminal, or --output FILE")
+def opened_output(path: str) -> Iterator[BinaryIO]:
+    """A file that appears when it is complete, or standard output for "-"; raises `InputError` for ``--output``.
+
+    A reader of standard output that leaves is no error: `BrokenPipeError` passes.
+    """
     try:
         with opened(path) as file:
-            sink = Sink(file, form, heading)
-            yield sink
-            sink.end()
+            yield file
     except BrokenPipeError:
         raise
     except OSError as error:
         raise InputError("--output", path, f"a file that can be written ({error.strerror or error})") from None
+
+
+@contextmanager
+def opened_sink(path: str, form: Form, heading: Sequence[str]) -> Iterator[Sink]:
+    """A file that appears when it is complete, or standard output for "-"; raises `InputError`."""
+    if path == "-" and form == "npy" and sys.stdout.isatty():
+        raise InputError("--format", "npy", "csv or ndjson for a terminal, or --output FILE")
+    with opened_output(path) as file:
+        sink = Sink(file, form, heading)
+        yield sink
+        sink.end()
 
 
 def form_of(path: str, given: str | None, source: Form) -> Form:

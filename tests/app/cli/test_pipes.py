@@ -20,6 +20,7 @@ from versions import needs_ompl
 import kin
 from app.cli import parser
 from app.cli.pipes import source
+from app.cli.pipes.sink import opened_output
 from app.shared.problems import Problem
 
 ROOT = Path(__file__).parents[3]
@@ -396,6 +397,16 @@ def test_configurations_may_be_as_the_pendant_shows_them(run):
     answers = "".join(json.dumps({"q": each.tolist()}) + "\n" for each in q)  # those of ik, with joint values
     _, again, _ = run("fk", "lrmate200id", "--configurations", "-", "--pendant", "--format", "npy", given=answers)
     assert again == out
+
+
+def test_a_reader_that_leaves_is_no_file_that_cannot_be_written(tmp_path):
+    with pytest.raises(BrokenPipeError), opened_output(str(tmp_path / "out.csv")):
+        raise BrokenPipeError
+    with (
+        pytest.raises(kin.InputError, match="a file that can be written"),
+        opened_output("missing/out.csv"),
+    ):
+        pass
 
 
 def test_solutions_may_be_as_the_pendant_shows_them(run, tmp_path):
