@@ -118,11 +118,14 @@ def _frames(plan: Plan, size: float) -> Node:
 
 
 def _ghosts(plan: Plan) -> Node:
-    """Translucent copies of the arm at the waypoints."""
+    """Translucent copies of the arm at the waypoints.
+
+    They are hidden, not removed: browsers do not draw others that are added below the same frame afterwards.
+    """
     robot, q = plan.motion.robot, plan.waypoints
     rows = np.unique(np.linspace(0, len(q) - 1, min(len(q), GHOSTS)).astype(int))
     positions, wxyz, _ = places(robot, q[rows])
-    node = placed("ghosts", robot, positions.reshape(-1, 3), wxyz.reshape(-1, 4), GHOST, 0.3, keep=False)
+    node = placed("ghosts", robot, positions.reshape(-1, 3), wxyz.reshape(-1, 4), GHOST, 0.3)
     node.props["batched_scales"] = np.tile(skeleton(robot).scales, (len(rows), 1))
     return node
 
