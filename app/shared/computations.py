@@ -208,6 +208,8 @@ class ComputationCache(Generic[T]):
         except BaseException as error:  # noqa: BLE001 - every caller raises it
             with self._lock:
                 self._forget(computation)  # the next caller tries again
+            if computation._cancelled:
+                error.__traceback__ = None  # it holds all that was being computed
             computation.future.set_exception(error)
             return
         with self._lock:

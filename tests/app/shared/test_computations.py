@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import weakref
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 
 import pytest
@@ -87,6 +88,22 @@ def test_the_computation_is_cancelled_when_the_last_subscriber_leaves(cache):
         second.future.result(20)
     assert cache.get("key", anew).result(0) == "anew", "its end does not touch the new result"
     assert cache.size == 1
+
+
+def test_a_cancelled_computation_holds_nothing_of_what_it_was_doing(cache):
+    held, large = Held(), []
+
+    def compute(computation):
+        local = Held()
+        large.append(weakref.ref(local))
+        held(computation)
+
+    subscription = cache.subscribe("key", compute)
+    wait_for(lambda: held.calls == 1)
+    subscription.leave()
+    held.released.set()
+    assert isinstance(subscription.future.exception(20), CancelledError)
+    assert large[0]() is None
 
 
 def test_a_computation_that_has_not_begun_is_never_run_after_its_last_subscriber_has_left():
