@@ -44,7 +44,9 @@ def example(robot: Robot) -> Array:
     R = fk(robot, q)[:, :3, :3]
     ahead = np.abs(DIRECTION @ R / np.linalg.norm(DIRECTION)).max(axis=1)
     seen = ahead < math.sqrt(1.0 - SEEN**2)
-    return np.asarray(q[int(np.argmax(seen + np.abs(R).reshape(_SAMPLES, 9).min(axis=1)))])
+    entries = np.abs(R).reshape(_SAMPLES, 9)
+    least = np.where(entries < 1e-9, 1.0, entries).min(axis=1)  # those of planar arms that are always zero aside
+    return np.asarray(q[int(np.argmax(seen + least))])
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:
