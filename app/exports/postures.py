@@ -46,10 +46,16 @@ def as_svg(found: PostureMap) -> bytes:
     return drawing(found).encode()
 
 
-def drawing(found: PostureMap, fluid: bool = False) -> str:
-    """The same as text; `fluid`: as wide as what it is in."""
+def drawing(found: PostureMap, side: float = SIZE, fluid: bool = False) -> str:
+    """The same as text.
+
+    Args:
+        found: the map.
+        side: of the map itself; texts have the same size at any.
+        fluid: whether the drawing is as wide as what it is in.
+    """
     x, y = found.plane.window
-    plot = Plot(MARGIN + 20.0, MARGIN + 30.0, SIZE, SIZE, x, y)
+    plot = Plot(MARGIN + 20.0, MARGIN + 30.0, side, side, x, y)
     width, height = plot.right + MARGIN + 50.0, plot.bottom + MARGIN
     title, limits = (
         f"Postures of {text_of(found.robot.name)}",

@@ -1,4 +1,4 @@
-"""Sizes and sections of workspaces, comparisons of arms, calibrations, computed once for all who ask.
+"""Sizes, sections and posture maps of arms, comparisons, calibrations, computed once for all who ask.
 
 A volume takes seconds, as may the mistakes that explain why two arms differ; the other sizes take a tenth of
 one. A computation ends when the last caller leaves its subscription. A section takes some 100 kB.
@@ -8,19 +8,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
-from kin import JointConstraints, Robot, compare
+from kin import JointConstraints, Robot, compare, posture_map
 from kin.comparison import Comparison, Frames
 from kin.ik.options import FREE
+from kin.postures import PostureMap
 from kin.workspace import Section, WorkspaceFacts, workspace_facts, workspace_section
 
 T = TypeVar("T")
 Plane = tuple[tuple[float, ...], tuple[float, ...]]
 
 KEPT = 64  # sizes, and as many sections
+NODES = (24, 48, 96)  # along a side of a posture map, coarse to fine
+
+
+class PostureRequest(NamedTuple):
+    """A posture map by the arguments of `kin.posture_map`; a key of the cache."""
+
+    robot: Robot
+    constraints: JointConstraints
+    respect_limits: bool
+    target: tuple[tuple[float, ...], ...] | None
+    normal: tuple[float, ...] | None
+    joints: tuple[int, int] | None
+    q: tuple[float, ...] | None
 
 
 class Summaries:
@@ -92,6 +106,21 @@ class Summaries:
             return compare(a, b, frames=frames, cancel=computation.check)
 
         return self._comparisons.subscribe((a, b, frames), compute)
+
+    def postures(self, request: PostureRequest) -> Subscription[PostureMap]:
+        """A map as by `kin.posture_map`; partial results are coarser ones, and progress counts nodes."""
+
+        def compute(computation: SharedComputation[PostureMap]) -> PostureMap:
+            arguments = request._asdict()
+            computation.total, before = sum(nodes**2 for nodes in NODES), 0
+            for nodes in NODES:
+                computation.latest = posture_map(**arguments, resolution=nodes, cancel=computation.check)
+                before += nodes**2
+                computation.done = before
+            assert computation.latest is not None
+            return computation.latest
+
+        return self._others.subscribe(request, compute)
 
     def once(self, key: Hashable, compute: Callable[[Callable[[], None]], T]) -> Subscription[T]:
         """What `compute` returns for this key, for all who ask; its argument raises once nobody waits any more."""

@@ -28,6 +28,7 @@ from app.viewer.tabs.workspace.cloud import CloudView
 from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import Click, Clicks, search
+from app.viewer.tabs.workspace.postures import Postures
 from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.section.panel import SectionPanel, count, subscribe_section
@@ -65,6 +66,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene)
         self._moved = 0.0  # when the arm did last
+        self._postures = Postures(stage, self)
         self._capability = Capability(stage, self, window, self._open_map)
         self._capability.use_look(self.settings.map, None, None)
         # Events by the first part of their key. A handler takes the other parts, and the value.
@@ -72,6 +74,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             "more": lambda _: None,
             "click": self._click,
             "capability": self._capability.handle,
+            "postures": self._postures.handle,
         }
         self._clouds.report()
 
@@ -169,6 +172,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._runner.end()
         self._clear()
         self._capability.on_robot()
+        self._postures.on_robot()
         robot = self.stage.now.robot
         self._use(self.settings.for_robot(robot))
         self._set_cut()
@@ -182,6 +186,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def on_request(self) -> None:
         self._clouds.report()  # shows the locked joints
         self._capability.refresh()
+        self._postures.refresh()
         self.refresh()
         self.due = 0.0
 
@@ -192,6 +197,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         if self._section is not None:
             self._section.use(units)
         self._capability.refresh()
+        self._postures.refresh()
         self.refresh()
         self.due = 0.0
 
@@ -212,12 +218,14 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         finally:
             self.schedule()
             super().tick(now)
-            times = self.due, self._clouds.next_tick(now, moving), self._capability.due
+            self._postures.tick(now)
+            times = self.due, self._clouds.next_tick(now, moving), self._capability.due, self._postures.due
             self.due = min((due for due in times if due is not None), default=None)
 
     def state(self) -> dict[str, object]:
         drawn = bool(self._clouds.nodes)
-        return {**super().state(), "drawn": drawn, "capability": self._capability.state()}
+        parts = {"capability": self._capability.state(), "postures": self._postures.state()}
+        return {**super().state(), "drawn": drawn, **parts}
 
     def restore(self, state: dict[str, object]) -> None:
         before, robot = self.settings, self.stage.now.robot
@@ -239,8 +247,9 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._listen_clicks()
         if state.get("drawn") is True:
             self._start()
-        if isinstance(saved := state.get("capability"), dict):
-            self._capability.restore(saved)
+        for name, part in (("capability", self._capability), ("postures", self._postures)):
+            if isinstance(saved := state.get(name), dict):
+                part.restore(saved)
         self.rewrite()
         self.refresh()
         self.due = 0.0
@@ -248,11 +257,13 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def on_leave(self) -> None:
         super().on_leave()
         self._capability.on_leave()
+        self._postures.on_leave()
 
     def remove(self) -> None:
         super().remove()
         self._clear()
         self._capability.clear()
+        self._postures.remove()
         self._axes.remove()
         self._show_section(False)
 
