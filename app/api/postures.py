@@ -127,7 +127,7 @@ async def postures(request: Request, robot: Robot, body: PostureMapRequest) -> R
     the borders between the regions, and the postures in each region.
 
     The arm must have as many joints that move as its task has dimensions; lock the others. A map of 200 × 200
-    nodes takes half a second with a closed form of its own, and up to 20 seconds for other arms of six joints.
+    nodes takes half a second with a closed form of its own, and seconds to half a minute for other arms.
     """
     return await computed(request, partial(_map, robot, body))
 
