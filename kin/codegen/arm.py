@@ -11,7 +11,7 @@ from kin.angles import TURN
 from kin.codegen import entries
 from kin.codegen.families import BOUNDS, Alone, alone, needs_python
 from kin.codegen.rooms import Rooms
-from kin.codegen.source import PRIMITIVES, OutsideSubsetError, Primitives, plain
+from kin.codegen.source import OutsideSubsetError, plain
 from kin.codegen.tree import Instance
 from kin.codegen.types import BOOL, FLOAT, INT, ArrayOf, Kernel, TupleOf
 from kin.codegen.typing import Program
@@ -59,12 +59,11 @@ class Arm:
         return len(self.form.branches)
 
 
-def arm_of(robot: Robot, closest: bool = True, primitives: Primitives = PRIMITIVES) -> Arm:
+def arm_of(robot: Robot, closest: bool = True) -> Arm:
     """The program of an arm.
 
     Args:
         closest: whether it finds what comes closest where no configuration exists.
-        primitives: see `Program`.
 
     Raises:
         InputError: an arm that cannot be emitted.
@@ -83,7 +82,7 @@ def arm_of(robot: Robot, closest: bool = True, primitives: Primitives = PRIMITIV
     }  # fmt: skip
     if closest:
         constants["starts"] = spread(robot.lower, robot.upper, STARTS)
-    program, rooms, made = Program(primitives), Rooms(BOUNDS), {}
+    program, rooms, made = Program(), Rooms(BOUNDS), {}
     try:
         for name, (kernel, kinds, shapes) in _entries(robot, form, found, parameter, constants, closest).items():
             made[name] = program.add(kernel, *kinds)

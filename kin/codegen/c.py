@@ -15,7 +15,7 @@ from pathlib import Path
 
 from kin.codegen.emit import ADD, ATOM, MULTIPLY, UNARY, Emitter, Text
 from kin.codegen.rooms import Rooms
-from kin.codegen.source import OutsideSubsetError
+from kin.codegen.source import OutsideSubsetError, is_inlined
 from kin.codegen.tree import (
     Call,
     Cast,
@@ -106,7 +106,8 @@ class C(Emitter):
                 lines.append(f"  {name_of(kind)} {self.name(name)} = {zero};")
         self.kinds += [*it.variables.values(), *it.kinds, it.result]
         self.kinds += [node.kind for node in walk(it.body) if isinstance(node, Expr)]
-        head = f"static {name_of(it.result)} {it.name}({', '.join(names) or 'void'}) {{"
+        start = "KINBOARD_INLINE" if is_inlined(it.function) else "static"
+        head = f"{start} {name_of(it.result)} {it.name}({', '.join(names) or 'void'}) {{"
         return "\n".join([*([f"// {it.note}"] if it.note else []), head, *self.storage, *lines, *self.lines, "}"])
 
     @property
@@ -284,7 +285,7 @@ def _definitions(kinds: Iterable[Type]) -> list[str]:
             given = ", ".join(f"{each} a{k}" for k, each in enumerate(names))
             puts = " ".join(f"x.{f'v[{k}]' if kind.alike else f'_{k}'} = a{k};" for k in range(count))
         head = f"typedef struct {{ {fields} }} {name};"
-        found[name] = f"{head}\nstatic inline {name} {name}_of({given}) {{ {name} x; {puts} return x; }}"
+        found[name] = f"{head}\nKINBOARD_INLINE {name} {name}_of({given}) {{ {name} x; {puts} return x; }}"
 
     for kind in kinds:
         define(kind)
@@ -303,7 +304,11 @@ def unit(program: Program, rooms: Rooms) -> str:
         item = _NAMES[_item_of(value.dtype.kind)]
         tables.append(f"static const {item} {name}[{value.size}] = {{{numbers}}};")
     more = [
-        "static inline t_fx2 sin_cos(double x) { return t_fx2_of(sin(x), cos(x)); }",
+        "KINBOARD_INLINE t_fx2 sin_cos(double x) {",
+        "  double s, c;",
+        "  sine_cosine_to(x, &s, &c);",
+        "  return t_fx2_of(s, c);",
+        "}",
         "static inline bool all_finite(f1 a) {",
         "  for (int64_t k = 0; k < a.n0; k++) if (!isfinite(a.p[k])) return false;",
         "  return true;",

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 
 from kin.codegen import source
-from kin.codegen.source import MISSING, Primitives, Scope
+from kin.codegen.source import MISSING, PRIMITIVES, Scope
 from kin.codegen.tree import Call, Copy, Expr, Instance, Items, Length, Literal, New, Primitive, Reshaped, View
 from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, ArrayOf, TupleOf, Type, widest
 
 
 class Calls(Scope):
     """The calls of a kernel; how its other expressions are read is given by who inherits from it."""
-
-    primitives: Primitives
 
     def expr(self, node: ast.expr) -> Expr:
         """An expression."""
@@ -52,8 +50,8 @@ class Calls(Scope):
             if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
                 raise self.refuse(node, "keyword or starred arguments", "pass each by position")
             values = tuple(map(self.expr, node.args))
-            if function in self.primitives:
-                return self.primitive(node, self.primitives[function], values)
+            if function in PRIMITIVES:
+                return self.primitive(node, PRIMITIVES[function], values)
             if isinstance(function, type) and issubclass(function, tuple) and hasattr(function, "_fields"):
                 if len(values) == len(function._fields):
                     return Items(TupleOf(tuple(v.kind for v in values), function._fields), values)

@@ -14,7 +14,6 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from kin.codegen.emit import ATOM, CHOICE, MULTIPLY, UNARY, Emitter, Text
-from kin.codegen.source import OutsideSubsetError
 from kin.codegen.tree import (
     Call,
     Cast,
@@ -177,9 +176,6 @@ class JavaScript(Emitter):
             return f"[{', '.join(arguments)}]"
         if name == "abs" and value.arguments[0].kind == COMPLEX:
             return f"Math.hypot(...{arguments[0]})"
-        if name in ("fma", "bits_of", "float_of"):
-            what = f"{name}, which JavaScript has not"
-            raise OutsideSubsetError(self.made.function, self.made.function, what, "write a * b + c")
         name = _MATH.get(name, f"Math.{name}" if name in _LANGUAGES else name)
         return f"{name}({', '.join(arguments)})"
 

@@ -23,8 +23,10 @@ import numpy as np
 
 from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, Constants, Scalar, TupleOf, Type
 from kin.kernels import simd
+from kin.kernels.compile import inlined, joined
 
 MISSING = object()
+_INLINED = (inlined.__name__, joined.__name__)
 
 
 class OutsideSubsetError(Exception):
@@ -43,9 +45,8 @@ def plain(value: Any) -> Any:
 
 
 # Functions that a language brings along: their names there, the types of the arguments and of the result.
-Primitives = Mapping[Any, tuple[str, tuple[Scalar, ...], Type]]
 _FLOATS = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "fabs")
-PRIMITIVES: Primitives = {
+PRIMITIVES: Mapping[Any, tuple[str, tuple[Scalar, ...], Type]] = {
     **{getattr(math, name): (name, (FLOAT,), FLOAT) for name in _FLOATS},
     **{getattr(math, name): (name, (FLOAT, FLOAT), FLOAT) for name in ("hypot", "atan2", "copysign")},
     math.isnan: ("isnan", (FLOAT,), BOOL),
@@ -54,9 +55,8 @@ PRIMITIVES: Primitives = {
     math.ceil: ("ceil_whole", (FLOAT,), INT),
     np.round: ("rint", (FLOAT,), FLOAT),
     np.rint: ("rint", (FLOAT,), FLOAT),
-    plain(simd.fma): ("fma", (FLOAT, FLOAT, FLOAT), FLOAT),
     plain(simd.widest): ("widest", (), NONE),
-    # Their polynomials read the bits of a float, which JavaScript cannot.
+    # Their polynomials read the bits of a float, which JavaScript cannot: it has its own functions.
     plain(simd.sin_cos): ("sin_cos", (FLOAT,), TupleOf((FLOAT, FLOAT))),
     plain(simd.atan2): ("arctan2", (FLOAT, FLOAT), FLOAT),
 }
@@ -76,6 +76,11 @@ def tree_of(function: FunctionType) -> ast.FunctionDef:
     if not isinstance(tree, ast.FunctionDef):
         raise OutsideSubsetError(function, tree, "no function", "define it with def")
     return tree
+
+
+def is_inlined(function: FunctionType) -> bool:
+    """Whether numba compiles a kernel into its callers, so that their loops are vectorised."""
+    return any(isinstance(each, ast.Name) and each.id in _INLINED for each in tree_of(function).decorator_list)
 
 
 class Scope:

@@ -17,7 +17,7 @@ import numpy as np
 
 from kin.codegen import source, subset
 from kin.codegen.calls import Calls, length_of
-from kin.codegen.source import MISSING, OutsideSubsetError, Primitives, plain, tree_of
+from kin.codegen.source import MISSING, OutsideSubsetError, plain, tree_of
 from kin.codegen.tree import (
     Assign,
     Call,
@@ -71,15 +71,9 @@ _SYMBOLS: dict[type[ast.AST], str] = {
 
 
 class Program:
-    """All kernels that some entries need, callees first.
+    """All kernels that some entries need, callees first."""
 
-    Args:
-        primitives: the functions that are not translated. Without those for sine and arc tangent, and with two for
-            the bits of a float, C computes the kernels' own polynomials.
-    """
-
-    def __init__(self, primitives: Primitives = source.PRIMITIVES) -> None:
-        self.primitives = primitives
+    def __init__(self) -> None:
         self.instances: list[Instance] = []
         self.tables: dict[str, np.ndarray[Any, Any]] = {}
         self._known: dict[tuple[FunctionType, tuple[Type, ...]], Instance | None] = {}
@@ -134,7 +128,7 @@ class _Builder(Calls):
         plain_arguments = not (arguments.defaults or arguments.kwonlyargs or arguments.vararg or arguments.kwarg)
         if len(names) != len(kinds) or not plain_arguments:
             raise self.refuse(self.tree, "a call with other arguments than the kernel's", "pass each by position")
-        self.program, self.primitives = program, program.primitives
+        self.program = program
         note = (ast.get_docstring(self.tree) or "").split("\n")[0]
         variables = dict(zip(names, kinds, strict=True))
         self.made = Instance(function, kinds, parameters=names, variables=variables, note=note)

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 import kin
-from kin.codegen import families, files, source, wrappers
+from kin.codegen import families, files, wrappers
 from kin.codegen.arm import Arm, arm_of
-from kin.codegen.types import FLOAT, INT, Constants
+from kin.codegen.types import Constants
 from kin.differential.metric import weights
 from kin.ik.candidates import Requirement, Rows, measure_and_sort
-from kin.kernels import simd
 from kin.kernels.checks import straighten
 from kin.robot import Robot
 from kin.solvers.contract import POSE, SolverInput
@@ -26,10 +25,8 @@ from kin.warmup import MADE_UP, made_up_arms
 
 STATUSES = ("solved", "approximate", "limits", "unmet", "orientation", "unreachable")
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
-# With these C computes what numba does, to the last bit: the kernels' own polynomials, no fusing of operations.
+# With these C computes what numba does, to the last bit: fused operations where the kernels ask for them alone.
 EXACT = ("-mfma", "-ffp-contract=off", "-fno-tree-vectorize")
-BITS = {simd._bits: ("bits_of", (FLOAT,), INT), simd._float: ("float_of", (INT,), FLOAT)}
-OWN = {k: row for k, row in source.PRIMITIVES.items() if row[0] not in ("sin_cos", "arctan2")} | BITS
 
 
 def _made_up() -> dict[str, Robot]:
@@ -107,8 +104,8 @@ def compiled(arm: Arm, folder: Path, *options: str) -> Built:
 
 
 def exact(robot: kin.Robot, folder: Path, level: str) -> Built:
-    """A library with the kernels' own sine and arc tangent."""
-    return compiled(arm_of(robot, False, OWN), folder, level, *EXACT)
+    """A library that fuses as numba does."""
+    return compiled(arm_of(robot, False), folder, level, *EXACT)
 
 
 def targets(robot: kin.Robot, random: int, hard: int):
