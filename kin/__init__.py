@@ -10,11 +10,12 @@ What most programs need is here, everything else in the package that it is about
 
 from typing import TYPE_CHECKING
 
-from kin import calibration, collision, comparison, dh, doctor, files, ik, motion, motors, path, workspace
+from kin import calibration, collision, comparison, dh, doctor, escape, files, ik, motion, motors, path, workspace
 from kin._version import __version__
 from kin.collision import Obstacle, clearance
 from kin.comparison import compare
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
+from kin.escape import leave_singularity
 from kin.files import (
     builtin_robots,
     get_robot,
@@ -84,6 +85,7 @@ __all__ = [
     "cuspidal",
     "dh",
     "doctor",
+    "escape",
     "files",
     "fk",
     "fk_positions",
@@ -94,6 +96,7 @@ __all__ = [
     "ik_branches",
     "interpolate_poses",
     "jacobian",
+    "leave_singularity",
     "link_frames",
     "load_robot",
     "manipulability",

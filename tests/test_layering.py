@@ -41,6 +41,7 @@ RULES: dict[str, set[str]] = {
         *("numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", "kin.later", "kin.typed"),
         *MODEL,
     },
+    "kin/escape": {"numpy", "kin.collision", "kin.escape", "kin.ik", "kin.solvers", "kin.way", *MODEL},
     "kin/doctor": {"numpy", "kin.doctor", "kin.files", "kin.typed", *MODEL},
     "kin/fitting": {"numpy", "kin.fitting", "kin.joint", "kin.robot", "kin.transforms"},
     "kin/motors": {"numpy", "kin.collision", "kin.motors", *MODEL},

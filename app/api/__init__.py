@@ -7,7 +7,7 @@ request bodies in ``uploads``, the ``classroom``, and the ``lines`` of pages wit
 
 from starlette.routing import BaseRoute
 
-from app.api import equations, fk, ik, jacobian, motion, path, postures, way
+from app.api import equations, fk, ik, jacobian, motion, path, postures, singularity, way
 from app.api.arms import calibrate, compare, files, motors, robots
 from app.api.body import UploadMemory
 from app.api.classroom import results
@@ -41,6 +41,7 @@ _MODULES = (
     way,
     jacobian,
     postures,
+    singularity,
     equations,
     download,
     socket,

@@ -22,6 +22,7 @@ from app.cli import arguments as declare
 from app.cli.arguments.calibrate import add_calibrate
 from app.cli.arguments.postures import add_cuspidal, add_postures
 from app.cli.arguments.shared import Parents
+from app.cli.arguments.singularity import add_singularity
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
 
@@ -266,6 +267,12 @@ def _load_way() -> Run:
     return run
 
 
+def _load_singularity() -> Run:
+    from app.cli.way import run_out
+
+    return run_out
+
+
 def _load_code() -> Run:
     from app.cli.files import run_code
 
@@ -350,6 +357,7 @@ COMMANDS = (
     Command("ik", declare.add_ik, _load_ik),
     Command("move", declare.add_move, _load_move),
     Command("way", declare.add_way, _load_way),
+    Command("singularity", add_singularity, _load_singularity),
     Command("page", declare.add_page, _load_page),
     Command("code", declare.add_code, _load_code),
     Command("robots", declare.add_robots, _load_robots, interpreted=True),

@@ -1,4 +1,4 @@
-"""``kinboard way``: a way around obstacles."""
+"""``kinboard way``: a way around obstacles. ``kinboard singularity``: a way out of a singularity."""
 
 from __future__ import annotations
 
@@ -19,14 +19,16 @@ from app.cli.terminal import (
 )
 from app.exports.program_toml import toml_of
 from app.exports.progress import progress_bar
+from app.shared.answers.singularity import ExitsAnswer
 from app.shared.answers.way import way_answer
-from kin import InputError
+from kin import InputError, leave_singularity
 from kin.files.numbers import index_of
 from kin.motion import JointTarget, Ptp
+from kin.motors import to_pendant
 from kin.units import Unit
 from kin.way import MOST_SEED, find_way, way_program
 
-SECONDS = Unit("s", 1.0, 2)
+SECONDS, SIGMA = Unit("s", 1.0, 2), Unit("", 1.0, 4)
 
 
 def run(arguments: Namespace) -> int:
@@ -68,6 +70,35 @@ def run(arguments: Namespace) -> int:
         program = replace(motion.program, segments=(first, *motion.program.segments))
         _write(arguments.output, toml_of(program, robot.name))
     return 0 if motion.planned else 1
+
+
+def run_out(arguments: Namespace) -> int:
+    """Print how near the arm is to a singularity, and the joint values to which the ways out lead.
+
+    Returns 1 if the arm is near one and there is no way out.
+    """
+    robot, units = mounted_robot_of(arguments), units_of(arguments)
+    q = configuration(robot, arguments.q, "q", units, arguments.pendant)
+    found = leave_singularity(
+        robot,
+        q,
+        margin=None if arguments.margin is None else quantity(arguments.margin, SIGMA, "--margin"),
+        obstacles=obstacles_of(arguments),
+        avoid_self_collision=arguments.avoid_self_collision,
+    )
+    if arguments.json:
+        print_json(ExitsAnswer.of(found))
+    else:
+        print(found.explain(units))
+    if found.exits and not arguments.json:
+        notation = Notation(robot, arguments.rad)
+        ends = [to_pendant(robot, each.q[-1]) if arguments.pendant else each.q[-1] for each in found.exits]
+        rows = [
+            [str(k + 1), *(notation.joint(i, value) for i, value in enumerate(end))] for k, end in enumerate(ends)
+        ]
+        print("\n" + table(["to", *(joint.name for joint in robot.joints)], rows))
+    clear = found.cause is not None and found.cause.code == "clear"
+    return 0 if found.exits or clear else 1
 
 
 def _write(path: str, text: str) -> None:

@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
+from kin.differential.error import task_error
 from kin.differential.task import LOST, Task, task_rows, usual_rank, weight
-from kin.fk import fk
 from kin.robot import Robot
-from kin.transforms import Array, rotation_vector
+from kin.transforms import Array
 
 Goal = Literal["limits", "manipulability"]
 TOLERANCE = 1e-10  # m and rad; how exactly the task is held
@@ -92,20 +92,6 @@ def margin(robot: Robot, q: Array) -> float:
     return float(min(shares, default=1.0))
 
 
-def error(robot: Robot, q: Array, T_held: Array, task: Task) -> Array:
-    """What is missing to the held pose ``(4, 4)``, in the rows of the task ``(m,)``: metres and radians."""
-    T = fk(robot, q)
-    way = T_held[:3, 3] - T[:3, 3]
-    if task == "position":
-        return np.asarray(way)
-    if task == "approach":
-        axis = np.cross(T[:3, 2], T_held[:3, 2])
-        sine, cosine = float(np.linalg.norm(axis)), float(T[:3, 2] @ T_held[:3, 2])
-        turn = axis * (math.atan2(sine, cosine) / sine if sine > 0.0 else 1.0)
-        return np.concatenate([way, T[:3, :2].T @ turn])
-    return np.concatenate([way, rotation_vector(T_held[:3, :3] @ T[:3, :3].T)])
-
-
 def hold(robot: Robot, q: Array, T_held: Array, task: Task, locked: Sequence[int] = ()) -> Array | None:
     """The configuration near q ``(n,)`` that holds the task exactly; None if Newton's method finds none nearby."""
     return _newton(robot, q, T_held, task, locked, None)
@@ -146,7 +132,7 @@ def _newton(
     """Minimum-norm Newton steps for the task and, if one is given, the value of a joint."""
     start, q = q, q.copy()
     for _ in range(_ITERATIONS):
-        missing = error(robot, q, T_held, task)
+        missing = task_error(robot, q, T_held, task)
         apart = 0.0 if given is None else given[1] - q[given[0]]
         if max(float(np.abs(missing).max()), abs(apart)) < TOLERANCE:
             return q if float(np.abs(q - start).max()) < SMOOTH else None

@@ -18,7 +18,7 @@ from kin.solvers.singular import Singularity
 Cause = Literal[
     "start", "target", "unreachable", "limits", "singularity", "branch", "circle", "task", "collision", "stop"
 ]
-HelpCode = Literal["ptp", "posture", "via", "start", "closer", "task"]
+HelpCode = Literal["ptp", "posture", "via", "start", "closer", "task", "shift", "tilt"]
 
 
 class StartOutside(NamedTuple):
@@ -142,12 +142,16 @@ class Help(NamedTuple):
     Attributes:
         code: ``"ptp"``: a PTP to the same target; ``"posture"``: another posture at the start; ``"via"``: a detour
             by another point; ``"start"``: a start inside the limits; ``"closer"``: a target closer to the arm;
-            ``"task"``: keeping less than the whole pose.
+            ``"task"``: keeping less than the whole pose; ``"shift"``: the same path beside this one; ``"tilt"``:
+            the same path with the tool turned.
         posture: name of the posture, for ``"posture"`` and ``"ptp"``; None if it has none.
+        vector: for ``"shift"`` in metres along the axes of the world; for ``"tilt"`` a rotation vector in radians
+            about the tool's own axes, the same all along the path.
     """
 
     code: HelpCode
     posture: str | None = None
+    vector: tuple[float, float, float] | None = None
 
 
 class BlendShortened(NamedTuple):
@@ -185,6 +189,7 @@ class Slowed(NamedTuple):
         quantity: which of its limits.
         ratio: the speed that the limits of velocity allow there, as a part of the median on this path.
         singularity: the one that is nearest there; None if none is near.
+        helps: what leads past it.
     """
 
     segment: int
@@ -194,6 +199,7 @@ class Slowed(NamedTuple):
     quantity: Literal["velocity", "acceleration", "jerk"]
     ratio: float
     singularity: Singularity | None
+    helps: tuple[Help, ...] = ()
 
 
 class Braked(NamedTuple):

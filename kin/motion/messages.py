@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,8 @@ _HELP = {
     "start": "move the joint inside its limits first",
     "closer": "choose a target closer to the arm",
     "task": "keep only the point, or point and approach direction",
+    "shift": "the same path beside it is even, shifted by {} at least (along the world's axes: {})",
+    "tilt": "the same path is even with the tool tilted by {} at least (about its own axes: {})",
 }
 
 
@@ -59,8 +62,18 @@ def refusal(
     where = "" if fraction is None else f", {100.0 * fraction:.1f} % of the way"
     worst = "at the worst place after it, " if where and isinstance(details, NotReached) else ""
     text = f"{which} cannot be driven{where}: {worst}{_why(details, units)}."
+    return text + _helps(helps, units)
+
+
+def _helps(helps: Sequence[Help], units: Units) -> str:
+    """What would help, a sentence each."""
+    text = ""
     for help_ in helps:
         said = _HELP[help_.code] + (f" ({help_.posture})" if help_.posture else "")
+        if help_.vector is not None:
+            unit = units.lengths if help_.code == "shift" else units.angles
+            parts = [f"{axis} {unit.value(each)}" for each, axis in zip(help_.vector, "xyz", strict=True) if each]
+            said = said.format(unit.value(math.hypot(*help_.vector)), listed(parts))
         text += f" {said[0].upper()}{said[1:]}."
     return text
 
@@ -131,12 +144,13 @@ def note(fact: Note, units: Units) -> str:
             )
         case BlendLeftOut(segment, why):
             return f"The arm stops at the end of segment {segment + 1} although a blend is set: {_STOPS[why]}."
-        case Slowed(segment, fraction, index, name, quantity, ratio, singularity):
+        case Slowed(segment, fraction, index, name, quantity, ratio, singularity, helps):
             near = f", close to a singularity ({short(singularity, units)})" if singularity else ""
-            return (
+            said = (
                 f"Segment {segment + 1} slows down to {100.0 * ratio:.2g} % of its usual speed at "
                 f"{100.0 * fraction:.0f} % of the way{near}: {joint(index, name)} is at its limit of {quantity}."
             )
+            return said + _helps(helps, units)
         case Braked(seconds):
             return f"The arm moves at the start: it brakes for {seconds:.3f} s before the first segment."
         case JerkCost(first, last, duration, without):

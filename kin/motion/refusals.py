@@ -22,6 +22,7 @@ from kin.motion.details import (
     SingularityMet,
     Slowed,
 )
+from kin.motion.detours import least_shift, least_tilt, path_of
 from kin.motion.paths import Layout
 from kin.motion.timing.timed import JointPath
 from kin.path.details import JointMove
@@ -120,11 +121,12 @@ def _shortfall(result: IKResult) -> tuple[float, float]:
 
 
 def helps_for(
-    robot: Robot, poses: Array, q: Array, task: Task, cause: Cause, can_follow: Callable[[Array], bool]
-) -> tuple[Help, ...]:
+    robot: Robot, poses: Array, q: Array, task: Task, cause: Cause, can_follow: Callable[[Array], bool],
+    velocity: Array,
+) -> tuple[Help, ...]:  # fmt: skip
     """What would help on a path of poses ``(k, 4, 4)`` that cannot be driven from q ``(n,)``.
 
-    `can_follow` says whether the path can be driven from a configuration.
+    `can_follow` says whether the path can be driven from a configuration, `velocity` ``(n,)`` are the limits.
     """
     end = solve_ik(robot, poses[-1], q_seed=q, task=task)
     if end.status is not Status.SOLVED:
@@ -136,7 +138,9 @@ def helps_for(
         found.append(Help("posture", branch_of(robot, other.q) if branch_names(robot) else None))
     elif cause in ("singularity", "branch"):
         found.append(Help("via"))
-    return tuple(found)
+    path = path_of(robot, task, q, poses, velocity) if cause == "singularity" else None
+    beside = () if path is None else (least_shift(path), least_tilt(path))
+    return (*found, *(each for each in beside if each is not None))
 
 
 def helps_at(robot: Robot, T: Array, q: Array, result: IKResult) -> tuple[Help, ...]:

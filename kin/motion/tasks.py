@@ -9,7 +9,10 @@ import numpy as np
 from kin.differential.task import Task
 from kin.fk import fk, jacobian
 from kin.robot import Robot
+from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.transforms import Array
+
+CODES: dict[Task, int] = {"pose": POSE, "approach": APPROACH, "position": POSITION}
 
 _DEPENDENT = 1e-6  # a twist that adds less than this to those before it (unit size) depends on them
 

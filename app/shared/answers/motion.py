@@ -145,9 +145,13 @@ class HelpAnswer(Answer):
 
     code: HelpCode
     """"ptp": a PTP to the same target. "posture": another posture at the start. "via": a via point. "start": a
-    start inside the limits. "closer": a target closer to the arm. "task": keeping less than the whole pose."""
+    start inside the limits. "closer": a target closer to the arm. "task": keeping less than the whole pose.
+    "shift": the same path beside this one. "tilt": the same path with the tool turned."""
     posture: str | None
     """Name of the posture for "ptp" and "posture"."""
+    vector: Annotated[list[float] | UnsetType, From("vector", unless_empty=True)] = UNSET
+    """For "shift" in metres along the axes of the world, for "tilt" a rotation vector in radians about the tool's
+    own axes; absent for others."""
 
 
 def _ik_details(refusal: Refusal) -> Details | UnsetType:
@@ -187,6 +191,14 @@ class NoteAnswer(Answer):
     """What it is about."""
     reason: Annotated[str, From(lambda note: messages.note(note, DEFAULT_UNITS))]
     """The same in a sentence for people."""
+    segment: int | UnsetType = UNSET
+    """Which segment, from 0; absent where it is about several or none."""
+    fraction: float | UnsetType = UNSET
+    """For "slowed": how much of it is covered at that place, 0 to 1."""
+    joint: int | UnsetType = UNSET
+    """For "slowed": which joint limits the speed there, from 0."""
+    helps: list[HelpAnswer] | UnsetType = UNSET
+    """For "slowed": what leads past a singularity that is near; empty if none is."""
 
 
 class JointLimitsAnswer(Answer):

@@ -14,10 +14,7 @@ from kin.motion.program import Move, Program, kind_of
 from kin.motion.results import InMotion, Motion, Refusal, SegmentTimes
 from kin.motion.tasks import most_kept
 from kin.robot import Robot
-from kin.solvers.contract import APPROACH, POSE, POSITION
 from kin.transforms import Array
-
-CODES: dict[Task, int] = {"pose": POSE, "approach": APPROACH, "position": POSITION}
 
 
 def task_of(program: Program, robot: Robot) -> Task:

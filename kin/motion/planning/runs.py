@@ -37,9 +37,10 @@ from kin.motion.paths import (
     left_out,
     radius_of,
 )
-from kin.motion.planning.plan import CODES, Plan, RefusedError
+from kin.motion.planning.plan import Plan, RefusedError
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, Ptp, Spline, Target
 from kin.motion.refusals import helps_at, helps_for, limit_met, lost, outside, violations
+from kin.motion.tasks import CODES
 from kin.transforms import Array
 
 _REST = 9  # places of the rest of a segment that are asked how far out of reach they are
@@ -223,7 +224,7 @@ def _refused_at(
             return False
         return not outside(plan.robot, values(knots, pieces, np.linspace(0.0, float(knots[-1]), 999))).any()
 
-    helps = helps_for(plan.robot, poses, plan.q, plan.task, cause, can_follow)
+    helps = helps_for(plan.robot, poses, plan.q, plan.task, cause, can_follow, plan.limits.velocity)
     return plan.refused(layout.owners[0][0] + k, cause, details, helps, (fraction, distance))
 
 

@@ -19,10 +19,11 @@ from kin.motion.geometry.chain import LostError, followed
 from kin.motion.geometry.curves import poses
 from kin.motion.geometry.splines import values
 from kin.motion.paths import NO_LENGTH, Layout, chained, curve_of
-from kin.motion.planning.plan import CODES, task_of
+from kin.motion.planning.plan import task_of
 from kin.motion.program import Circ, JointTarget, Lin, PoseTarget
 from kin.motion.refusals import outside
 from kin.motion.results import Motion
+from kin.motion.tasks import CODES
 from kin.robot import Robot
 from kin.transforms import Array
 

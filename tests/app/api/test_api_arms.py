@@ -152,6 +152,7 @@ def test_a_wrong_list_is_refused_by_its_field(client, wrong, field):
 OPERATIONS = {
     "fk": {"q": Q, "frames": True},
     "jacobian": {"q": [Q, Q]},
+    "singularity": {"q": [1.0, 1.0, 0.0, 0.5, 0.6]},
     "ik": TARGET,
     "ik/path": {"targets": [{"position": [-0.03, 0.157, z]} for z in (-0.194, -0.2)]},
     "reachable": {"target": [POSE, {"position": [2, 0, 0]}]},
@@ -170,7 +171,7 @@ def test_an_arm_sent_along_is_answered_as_one_of_the_service(client, path):
     sent = {"robot": {**EXAMPLE, "id": "pioneer5", "name": PIONEER.name, "source": PIONEER.source}}
     sent["robot"]["description"] = PIONEER.description
     name = path.removeprefix("robots/")
-    if path in ("fk", "jacobian", "ik", "ik/path", "reachable"):
+    if path in ("fk", "jacobian", "singularity", "ik", "ik/path", "reachable"):
         expected = client.post(f"/api/v1/robots/pioneer5/{name}", json=body)
     else:
         expected = client.get(f"/api/v1/robots/pioneer5/{name}", params=body)

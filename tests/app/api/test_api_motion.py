@@ -192,6 +192,20 @@ def test_a_pose_out_of_reach_is_explained_as_inverse_kinematics_does(client):
     assert refusal["details"]["details"] == refusal["ik"], "where it was before"
 
 
+def test_a_slow_place_beside_a_singularity_comes_with_what_leads_past_it(client):
+    robot, q = kin.get_robot("ur5"), np.array([0.0, -1.2, 1.6, -1.9, 0.3, 0.2])
+    end = kin.fk(robot, np.add(q, [0.02, 0.0, 0.0, 0.0, -0.6, 0.0]))
+    position, wxyz = end[:3, 3].tolist(), kin.wxyz_from_rotation(end[:3, :3]).tolist()
+    program = {"segments": [{"kind": "lin", "position": position, "wxyz": wxyz}]}
+    body = {"program": program, "q_start": q.tolist(), "samples": False}
+    notes = client.post("/api/v1/robots/ur5/motion", json=body).json()["notes"]
+    (note,) = [each for each in notes if each["code"] == "slowed"]
+    assert (note["segment"], 0.4 < note["fraction"] < 0.6) == (0, True)
+    assert [each["code"] for each in note["helps"]] == ["ptp", "posture", "shift", "tilt"]
+    assert ["vector" in each for each in note["helps"]] == [False, False, True, True]
+    assert all("helps" not in each for each in notes if each is not note)
+
+
 def test_a_start_outside_the_limits_is_an_answer(client):
     refusal = post(client, {"q_start": [7.0, *Q[1:]]}).json()["refusal"]
     assert (refusal["cause"], refusal["helps"]) == ("start", [{"code": "start", "posture": None}])

@@ -139,6 +139,7 @@ SHORT = {
     "summary": ("get", "/robots/planar2r/workspace/summary?volume=false", None),
     "posture_map": ("post", "/robots/planar2r/postures", {"resolution": 8}),
     "cuspidal": ("get", "/robots/gofa/cuspidal", None),
+    "leave_singularity": ("post", "/robots/planar2r/singularity", {"q": [0.3, 0.0]}),
     "capability": ("get", "/robots/planar2r/capability?resolution=4&directions=12", None),
     "plan_motion": (
         "post",

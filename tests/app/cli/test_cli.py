@@ -428,6 +428,24 @@ def test_flags_reach_the_settings_and_win_over_the_environment(served, monkeypat
     assert opened is True
 
 
+def test_the_ways_out_of_a_singularity_are_printed(capsys):
+    words = ("singularity", "ur5e", 20, -70, 80, -40, 0, 10)
+    code, out, _ = run(capsys, *words)
+    found = kin.leave_singularity("ur5e", np.radians(words[2:]))
+    assert code == 0
+    assert out.startswith(found.reason + "\n")
+    rows = out.split("\n\n")[1].splitlines()[-len(found.exits) :]
+    for row, each in zip(rows, found.exits, strict=True):
+        numbers = [float(x) for x in re.findall(r"(-?[\d.]+)°", row)]
+        assert numbers == pytest.approx(np.degrees(each.q[-1]), abs=1e-3)
+    assert answer(capsys, *words)["exits"][0]["posture"] == found.exits[0].posture
+    assert run(capsys, "singularity", "ur5e", 0, -90, 90, -90, 90, 0)[0] == 0
+    assert answer(capsys, *words, "--margin", "0.9", code=1)["cause"]["code"] == "margin"
+    code, _, err = run(capsys, *words, "--margin", "wide")
+    assert code == 2
+    assert "--margin" in err
+
+
 def test_each_row_of_the_commands_is_named_as_the_command():
     assert [name for name in parser.subcommands() if " " not in name] == [each.name for each in parser.COMMANDS]
 

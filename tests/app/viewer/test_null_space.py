@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import kin
-from app.viewer.null_space import error, hold, lead, margin, measure, null_space, secondary
+from app.viewer.null_space import hold, lead, margin, measure, null_space, secondary
 from app.viewer.self_motion import leaders
 from kin import Robot
+from kin.differential.error import task_error
 from kin.differential.task import free_motions, task_rows
 from kin.ik import Task
 from kin.transforms import rotation_angle, vector_angle
@@ -54,7 +55,7 @@ def test_the_null_space_of_the_jacobian(case: tuple[Robot, Task]) -> None:
         assert np.allclose(space.project(z), N @ z, atol=1e-8)
         # The task rows are those of finite differences of the task's error.
         dq = 1e-6 * rng.normal(size=robot.n)
-        assert error(robot, q, kin.fk(robot, q + dq), task) == pytest.approx(J @ dq, abs=1e-11)
+        assert task_error(robot, q, kin.fk(robot, q + dq), task) == pytest.approx(J @ dq, abs=1e-11)
         part = {"pose": "all", "position": "linear"}.get(task)
         if part and space.rank == min(len(J), robot.n):
             assert float(measure(robot, q, task, space.rank)) == pytest.approx(
