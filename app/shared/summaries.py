@@ -1,4 +1,4 @@
-"""Sizes, sections and posture maps of arms, comparisons, calibrations, computed once for all who ask.
+"""Sizes, sections and posture maps of arms, comparisons, calibrations and other answers, computed once for all who ask.
 
 A volume takes seconds, as may the mistakes that explain why two arms differ; the other sizes take a tenth of
 one. A computation ends when the last caller leaves its subscription. A section takes some 100 kB.
@@ -12,10 +12,12 @@ from typing import Any, NamedTuple, TypeVar
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
-from kin import JointConstraints, Robot, compare, posture_map
+from kin import JointConstraints, Obstacle, Robot, compare, leave_singularity, posture_map
 from kin.comparison import Comparison, Frames
+from kin.escape import Exits
 from kin.ik.options import FREE
 from kin.postures import PostureMap
+from kin.transforms import Array
 from kin.workspace import Section, WorkspaceFacts, workspace_facts, workspace_section
 
 T = TypeVar("T")
@@ -125,6 +127,16 @@ class Summaries:
     def once(self, key: Hashable, compute: Callable[[Callable[[], None]], T]) -> Subscription[T]:
         """What `compute` returns for this key, for all who ask; its argument raises once nobody waits any more."""
         return self._others.subscribe(key, lambda computation: compute(computation.check))
+
+    def exits(self, robot: Robot, q: Array, obstacles: tuple[Obstacle, ...]) -> Subscription[Exits]:
+        """The ways out of a singularity as by `kin.leave_singularity`; links with known bodies do not touch."""
+        itself = bool(robot.capsules)
+        return self.once(
+            ("exits", robot, q.tobytes(), obstacles),
+            lambda cancel: leave_singularity(
+                robot, q, obstacles=obstacles, avoid_self_collision=itself, cancel=cancel
+            ),
+        )
 
     @property
     def pending(self) -> int:

@@ -14,9 +14,9 @@ import numpy as np
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Node as SceneNode
-from app.viewer.declared.work import Sweep
+from app.viewer.declared.work import Sweep, Work
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.velocity import section_views, views
+from app.viewer.lessons.velocity import exits, section_views, views
 from app.viewer.lessons.velocity.drawing import force_scale, lost_ends, scene, truncated
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.jog import BUTTONS, button, step
@@ -39,7 +39,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     about = "The velocities and forces of the tool: Jacobian, ellipsoids, singularities."
     outline = staticmethod(outline)
     settings_of, facts_of = VelocitySettings, VelocityFacts
-    undo: ClassVar[dict[str, str]] = {"on_jog": "Jog"}
+    undo: ClassVar[dict[str, str]] = {"on_jog": "Jog", "on_drive": "Step out"}
 
     # What is shown
 
@@ -47,7 +47,11 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         f, s, robot, units = self.read, self.settings, self.stage.now.robot, self.stage.units
         columns = {str(k + 1): self.event(self.on_column, k) for k in range(robot.n)}
         return [
-            *self.unless_asked("singularities", Html(views.warning_html, (robot, f.found, units, f.lost_words))),
+            *self.unless_asked(
+                "singularities",
+                Html(views.warning_html, (robot, f.found, units, f.lost_words)),
+                self._step_out(f),
+            ),
             Control("frame"),
             Folder("Jacobian", self.unless_asked(
                 "jacobian",
@@ -86,7 +90,9 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
 
     def scene(self) -> Sequence[SceneNode]:
         eye = np.asarray(self.stage.client.camera.position)
-        return scene(self.facts, self.read, eye, self.stage.activity.withheld)
+        nodes = scene(self.facts, self.read, eye, self.stage.activity.withheld)
+        shown = None if self.hides("singularities") else self.facts.exit
+        return nodes if shown is None else [*nodes, exits.drawn(self.facts.robot, shown)]
 
     def legend(self) -> str:
         f, s = self.read, self.settings
@@ -120,6 +126,22 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         args = (f.robot, f.task, f.space, f.speeds, f.measure, f.margin)
         return Html(section_views.null_and_margin_html, args)
 
+    def _step_out(self, f: VelocityFacts) -> Folder:
+        """The button, or the ways out."""
+        found = f.exits
+        if f.leaving is None:
+            button = Button("Step out", self.event(self.on_step_out), exits.STEP_HINT)
+            return Folder(None, [button], key="step out", visible=f.state != "far")
+        if found is None:
+            return Folder(None, [Html(exits.searching_html)], key="step out")
+        choices = {str(k + 1): self.event(self.on_exit, k) for k in range(len(found.exits))}
+        return Folder(None, [
+            Html(exits.exits_html, (found, self.settings.exit, self.stage.units)),
+            *([Buttons("Way out", choices, exits.EXIT_HINT, of=id(found))] if len(choices) > 1 else []),
+            *([Button("Drive there", self.event(self.on_drive), exits.DRIVE_HINT)] if choices else []),
+            Button("Stay here", self.event(self.on_stay), exits.STAY_HINT, key="stay"),
+        ], key="step out")  # fmt: skip
+
     # What events do
 
     def changed(self, path: str) -> None:
@@ -143,6 +165,29 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             stage.notify(made.notice)
         else:
             stage.move_to(made.q, made.notice)
+
+    def on_step_out(self) -> None:
+        self.change(leaving=self.stage.now.goal, exit=0, driven=None, runs=False)
+
+    def on_exit(self, which: int) -> None:
+        self.change(exit=which)
+
+    def on_stay(self) -> None:
+        self.change(leaving=None, driven=None)
+
+    def on_drive(self) -> None:
+        """Drive the way out that is drawn; frame by frame if the tool is to stay where it is between waypoints."""
+        shown, found, stage = self.facts.exit, self.facts.exits, self.stage
+        if shown is None or found is None:
+            return
+        locked = exits.locked(stage.now, shown)
+        if locked:
+            stage.notify(locked)
+        elif shown.keeps_tool:
+            self.change(driven=(shown.q, 0))
+        else:
+            self.change(leaving=None)
+            stage.move_to(shown.q[-1], exits.left(found, shown, stage.units))
 
     def on_least(self) -> None:
         size = float(np.linalg.norm(self.settings.statics.force)) or -FIRST[2]
@@ -170,8 +215,14 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         """Where the arrows of lost directions end that are drawn ``(n, 3)``."""
         return np.zeros((0, 3)) if "singularities" in self._withheld else lost_ends(self.read).round(6)
 
-    def running(self) -> Sequence[Sweep]:
-        return [Sweep(self._move, FRAME)] if self.settings.runs else []
+    def running(self) -> Sequence[Work | Sweep]:
+        found: list[Work | Sweep] = [Sweep(self._move, FRAME)] if self.settings.runs else []
+        if (leaving := self.facts.leaving) is not None:
+            arm = self.stage.now
+            found.append(Work("exits", self.stage.summaries.exits, (arm.robot, leaving, arm.obstacles)))
+        if self.settings.driven is not None:
+            found.append(Sweep(self._drive, FRAME))
+        return found
 
     def _move(self, seconds: float) -> None:
         """A frame of the motion in the null space; another motion of the arm ends it."""
@@ -186,6 +237,19 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         self.change(runs=False, motion=None)
         if made is not None:
             self.stage.notify(made)
+
+    def _drive(self, seconds: float) -> None:
+        """A frame of the way out; another motion of the arm ends it."""
+        made, found = self.settings.driven, self.facts.exits
+        if made is None or found is None or not np.array_equal(made[0][made[1]], self.stage.now.goal):
+            self.change(driven=None, leaving=None)
+            return
+        q, passed = made[0], exits.after(*made, seconds)
+        done = exits.left(found, found.exits[self.settings.exit], self.stage.units)
+        self.change(driven=(q, passed))
+        self.stage.move_to(q[passed], done, at_once=True)
+        if passed == len(q) - 1:
+            self.change(driven=None, leaving=None)
 
     def _push(self, force: Sequence[float]) -> None:
         """Show this force, within the limits."""

@@ -1,0 +1,105 @@
+"""*Step out* in the lesson "Velocity": what it says, the ghost, and the motion, without a browser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from bare_page import STORE, BarePage, bare_page
+
+import kin
+from app.shared.summaries import Summaries
+from app.viewer.lessons.velocity.exits import after
+from app.viewer.lessons.velocity.lesson import VelocityLesson
+
+WRIST = np.array([0.3, -1.2, 1.4, -0.7, 0.0, 0.2])  # of a UR5e
+UPRIGHT = np.array([0.1, 0.0, np.pi / 2, -1.2, 0.3, 1.0, 0.4])  # of an iiwa
+
+
+@pytest.fixture
+def page() -> Iterator[BarePage]:
+    with bare_page(STORE.get("ur5e")) as opened:
+        summaries = Summaries(threads=1)
+        opened.summaries = summaries  # type: ignore[attr-defined]
+        yield opened
+        summaries.close()
+
+
+def step_out(page: BarePage, q: np.ndarray) -> kin.escape.Exits:
+    """Press the button at a configuration, and wait for the answer."""
+    page.use(page.now.robot, q)
+    page.open(VelocityLesson)
+    page.press("Step out")
+    page.rest()
+    found = page.summaries.exits(page.now.robot, q, ()).future.result(60.0)  # type: ignore[attr-defined]
+    page.rest()
+    assert isinstance(found, kin.escape.Exits)
+    return found
+
+
+def text(page: BarePage) -> str:
+    return json.dumps(page.panel(), ensure_ascii=False)
+
+
+def ghosts(page: BarePage) -> list[object]:
+    return [props["batched_positions"] for kind, _, props in page.scene() if kind.startswith("Batched")]
+
+
+def test_the_ways_out_are_said_and_drawn_before_one_is_driven(page: BarePage) -> None:
+    found = step_out(page, WRIST)
+    assert len(found.exits) == 2
+    for each in found.exits:
+        assert f"moves by {1e3 * each.translation:.1f} mm" in text(page)
+    assert "no-flip" in text(page)
+    first = ghosts(page)
+    assert len(first) == 1
+    assert np.array_equal(page.now.goal, WRIST), "nothing has moved"
+    page.press("Way out", "2")
+    page.rest()
+    assert ghosts(page) != first
+    page.press("Drive there")
+    page.rest()
+    assert np.allclose(page.now.goal, found.exits[1].q[-1])
+    assert page.notices[-1].title == "Out of the singularity"
+    assert not ghosts(page)
+
+
+def test_a_way_out_that_keeps_the_tool_is_driven_by_its_waypoints(page: BarePage) -> None:
+    page.use(STORE.get("iiwa14"))
+    found = step_out(page, UPRIGHT)
+    assert found.exits[0].keeps_tool
+    T, seen = kin.fk("iiwa14", UPRIGHT), list[np.ndarray]()
+    page.move_to, plain = lambda q, *more, **named: (seen.append(q), plain(q, *more, **named)), page.move_to  # type: ignore[method-assign,assign]
+    page.press("Drive there")
+    page.rest()
+    assert len(seen) > 3
+    assert np.allclose(seen[-1], found.exits[0].q[-1])
+    assert np.abs(kin.fk("iiwa14", np.array(seen)) - T).max() < 1e-8
+    assert np.abs(np.diff(np.array([UPRIGHT, *seen]), axis=0)).max() < 0.06
+
+
+def test_the_offer_ends_when_the_arm_is_moved_and_is_not_made_far_from_a_singularity(page: BarePage) -> None:
+    step_out(page, WRIST)
+    page.pose(STORE.get("ur5e").q_home)
+    assert "Step out" not in text(page)
+    assert "Drive there" not in text(page)
+    assert not ghosts(page)
+
+
+def test_a_locked_joint_is_not_moved(page: BarePage) -> None:
+    page.use(page.now.robot, WRIST)
+    step_out(page, WRIST)
+    page.now = page.now.__class__(page.now.robot, WRIST, page.now.goal, locks=(False,) * 4 + (True, False))
+    page.press("Drive there")
+    page.rest()
+    assert page.notices[-1].detail == "Unlock 5 wrist 2 first."
+    assert np.array_equal(page.now.goal, WRIST)
+
+
+def test_frames_pass_whole_waypoints_at_most_as_fast_as_joints_may() -> None:
+    q = np.linspace(0.0, 1.0, 101)[:, None] * np.array([1.0, -0.5])
+    assert after(q, 0, 0.1) == 5
+    assert after(q, 98, 1.0) == 100
+    assert after(q, 10, 0.0) == 11, "at least one"
