@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from app.shared.answers.inspection import singular_at
 from app.shared.solver_names import FILE, computed_names
 from kin import InputError, Robot, builtin_robots, cuspidal
 from kin.files import classic_robots
@@ -26,6 +27,9 @@ The field *Find an arm* in the tab *Robot*, `kinboard robots --find "kuka joints
 (`reach:0.5..1.2`) and solver (`solver:wrist6`). The reach is an upper bound, from the base to the tool point.
 The solvers have [pages of their own](background/inverse-kinematics.md). On the site of this documentation, each
 picture leads to the arm: a [page that solves by itself](embedding.md#as-a-file).
+
+An arm that is [singular](background/singularities.md) at home or at zero says so: a motion of the tool is lost
+there. `kin.leave_singularity` finds [the way out](background/singularities.md#the-way-out).
 
 This page is written by `scripts/arms_page.py`.
 """
@@ -79,7 +83,7 @@ def _row(robot: Robot) -> str:
     maker = f"<br>{robot.maker}" if robot.maker and not robot.name.startswith(robot.maker) else ""
     cells = (
         picture,
-        f"**{robot.name}**{maker}<br>{robot.description}",
+        f"**{robot.name}**{maker}<br>{robot.description} {singular_at(robot)}".rstrip(),
         f"`{robot.id}`",
         str(robot.n),
         f"{robot.reach:.2f} m",

@@ -12,13 +12,16 @@ import numpy as np
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.robots import RobotAnswer, robot_answer
-from kin import Robot, jacobian
+from kin import Robot, jacobian, singularities
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
 from kin.collision.bodies import bodies_of
 from kin.files.home import candidates, margins
 from kin.files.units import suspicious_angles
+from kin.ik.messages.singularity import CONDITIONS
 from kin.solvers import closed_form_of, family_of
+from kin.tolerances import TOLERANCES
 
+_SINGULAR = {"smallest singular value": "the tool cannot move in some direction"}  # what has no name of its own
 NEAR_SINGULAR, SINGULAR = 0.1, 1e-6  # of the best margin among the candidates for a home pose
 LONG, SHORT = 100.0, 0.01  # m; a reach beyond these suggests a wrong unit
 
@@ -152,6 +155,19 @@ def home_margin(robot: Robot) -> float:
     """Margin of the home configuration (see `kin.files.home`), relative to the best of the candidates for one."""
     margin = margins(robot, np.vstack([robot.q_home, candidates(robot)[0]]))
     return float(margin[0] / margin.max()) if margin.max() > 0.0 else 0.0
+
+
+def singular_at(robot: Robot) -> str:
+    """Where an arm is singular of home and zero, as far as its limits allow zero, and how, in a sentence each."""
+    said = []
+    for name, q in (("home", robot.q_home), ("zero", np.zeros(robot.n))):
+        if ((q < robot.lower) | (q > robot.upper)).any():
+            continue
+        near = singularities(robot, q, TOLERANCES.at_singularity)
+        named = [_SINGULAR.get(s.condition, CONDITIONS[s.condition]) for s in near if s.kind != "algorithmic"]
+        if named:
+            said.append(f"At {name} it is singular: {', '.join(dict.fromkeys(named))}.")
+    return " ".join(said)
 
 
 def _odd_table(robot: Robot, taken: bool) -> list[str]:

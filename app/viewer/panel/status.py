@@ -10,6 +10,7 @@ from typing import Literal
 import viser
 
 from app.exports.worksheet.sheet import indexed
+from app.shared.answers.inspection import singular_at
 from app.viewer.panel import update_html
 from app.viewer.panel.part import add_html
 from app.viewer.panel.posture import short
@@ -116,8 +117,9 @@ def _errors(shown: IKSolution, units: Units) -> str:
 
 
 def introduction(robot: Robot) -> Notice:
-    """A robot's name and the first sentence of its description."""
-    return Notice("hand", robot.name, re.split(r"(?<=[.!?]) ", robot.description, maxsplit=1)[0])
+    """A robot's name, the first sentence of its description, and where it is singular of home and zero."""
+    first = re.split(r"(?<=[.!?]) ", robot.description, maxsplit=1)[0]
+    return Notice("hand", robot.name, f"{first} {singular_at(robot)}".strip())
 
 
 def _kind(result: IKResult) -> Kind:
