@@ -55,6 +55,7 @@ TRUSTED = {
     "app/classroom/marks.py": "our database",
     "app/classroom/results/gains.py": "our database",
     "app/cli": "files of who runs the command",
+    "app/exercises/lesson_text.py": "files of ours",
     "app/exports/formats.py": "it writes",
     "app/live/client/connection.py": "the service to which a program has connected",
     "app/notebook/child.py": "the process that started this one",

@@ -1,4 +1,4 @@
-"""Sizes, sections and posture maps of arms, comparisons, calibrations and other answers, computed once for all who ask.
+"""Sizes, sections and posture maps of arms, comparisons and other answers, computed once for all who ask.
 
 A volume takes seconds, as may the mistakes that explain why two arms differ; the other sizes take a tenth of
 one. A computation ends when the last caller leaves its subscription. A section takes some 100 kB.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -10,11 +11,15 @@ from app.classroom.results.table import Member
 from app.classroom.work import Attempt
 
 MOST = 6  # reasons of an exercise
+NUMBERS = re.compile(r"[−-]?\d+(?:[.,]\d+)?")
 
 
 @dataclass(frozen=True)
 class Reason:
-    """A reason why answers were wrong, and the aliases of the students who gave such answers."""
+    """A reason why answers were wrong, in the words for the first of the students who gave such answers.
+
+    Reasons that differ by the numbers in them alone, which are each student's own, are one.
+    """
 
     words: str
     students: tuple[str, ...]
@@ -40,16 +45,19 @@ def mistakes(members: Iterable[Member], attempts: Sequence[Attempt]) -> list[Mis
     """Of each exercise with a wrong answer, in the order of the first ones; attempts come in the order of time."""
     names = {one.seat: one.alias for one in sorted(members, key=lambda one: one.number)}
     wrong: dict[str, dict[str, set[str]]] = {}
+    said: dict[str, str] = {}  # the words with numbers, of those without
     for one in attempts:
         if one.seat in names and one.score < 1.0 and not one.gave_up:
-            wrong.setdefault(one.exercise, {}).setdefault(one.verdict, set()).add(one.seat)
+            kind = NUMBERS.sub("", one.verdict)
+            said.setdefault(kind, one.verdict)
+            wrong.setdefault(one.exercise, {}).setdefault(kind, set()).add(one.seat)
     first = {key: score for key, score in first_scores(attempts).items() if key[0] in names}
     found = []
     for exercise, reasons in wrong.items():
         scores = [score for (_, asked), score in first.items() if asked == exercise]
         listed = [
-            Reason(words, tuple(names[seat] for seat in names if seat in seats))
-            for words, seats in reasons.items()
+            Reason(said[kind], tuple(names[seat] for seat in names if seat in seats))
+            for kind, seats in reasons.items()
         ]
         listed.sort(key=lambda one: -len(one.students))
         found.append(Mistakes(exercise, len(scores), sum(s >= 1.0 for s in scores), tuple(listed[:MOST])))

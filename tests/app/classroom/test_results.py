@@ -170,8 +170,15 @@ def test_the_reasons_of_wrong_answers_are_counted_by_student() -> None:
     (found,) = mistakes(members, [*attempts, attempt("flo", "b", 1.0, 8.0)])
     assert (found.exercise, found.students, found.first) == ("a", 4, 1)
     assert found.reasons == (Reason("Too small.", ("Di", "Ed")), Reason("Too large.", ("Di",)))
-    many = [wrong("di", f"Reason {i}.", float(i)) for i in range(2 * MOST)]
+    many = [wrong("di", f"Reason {chr(97 + i)}.", float(i)) for i in range(2 * MOST)]
     assert len(mistakes(members, many)[0].reasons) == MOST
+
+
+def test_reasons_that_differ_by_the_numbers_of_each_student_are_one() -> None:
+    members = [Member(seat, alias, number) for number, (seat, alias) in enumerate([("d", "Di"), ("e", "Ed")])]
+    said = ("The sine, 0.5 m, was taken for the cosine.", "The sine, −1.5 m, was taken for the cosine.")
+    given = [replace(attempt(s, "a", 0.0, 1.0), verdict=words) for s, words in zip("de", said, strict=True)]
+    assert mistakes(members, given)[0].reasons == (Reason(said[0], ("Di", "Ed")),)
 
 
 @given(st.text(max_size=12), st.text(max_size=12))
