@@ -273,7 +273,7 @@ def test_other_browsers_compute_and_draw_the_same(name: str, file: Path, tmp_pat
     with web_driver.started(name, tmp_path) as page:
         page.resize(1280, 720)
         page.open(copy.as_uri())
-        page.wait("window.kinboardArm")
+        page.wait("!!window.kinboardArm")
         for robot in (UR5, kin.get_robot("scara"), kin.get_robot("panda")):
             assert page.run(f"return ({WORST})(arguments[0])", question(robot, 10_000)) < 1e-12
         assert page.run("return document.querySelector('#no-scene').hidden")
