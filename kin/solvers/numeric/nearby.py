@@ -2,8 +2,9 @@
 
 The nearest configuration inside the limits has the least |w (x − seed)|² of all that meet the task. Near a
 configuration q the task is J (x − q) = e, and the answer is x = clamp(seed + Jᵀ λ / w²), whose multipliers λ
-follow by Newton steps on the dual problem. The configuration moves there, or as far towards it as the distance
-falls, and back onto the task. What is found is a local minimum.
+follow by Newton steps on the dual problem, halved where limits that switch lead a whole one away. The
+configuration moves there, or as far towards it as the distance falls, and back onto the task. What is found is a
+local minimum.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from kin.solvers.numeric.error import Goal, look, quadratic_model
 from kin.solvers.numeric.step import solve_free
 from kin.transforms import Array
 
-_DUAL, _BACK, _STEPS = 12, 8, 60
+_DUAL, _HALVED, _BACK, _STEPS = 40, 6, 8, 60
 _STRIDE = 0.5  # weighted radians of one joint in one step
 _FLOOR = 1e-12  # of the dual problem's matrix, as a share of its largest entry
 _TIGHT, _MET = 1e-13, 1e-11  # what steps back aim for, and what counts as met; of E, metres
@@ -44,6 +45,7 @@ def _foot(J: Array, e: Array, q: Array, aim: Array, scale: Array, low: Array, hi
     m, n = J.shape
     multipliers, left, move = np.zeros(m), np.empty(m), np.empty(m)
     H, L, free = np.empty((m, m)), np.empty((m, m)), np.ones(m, dtype=np.bool_)
+    before, halved = math.inf, 0
     for _ in range(_DUAL):
         for r in range(m):
             left[r] = e[r]
@@ -61,7 +63,16 @@ def _foot(J: Array, e: Array, q: Array, aim: Array, scale: Array, low: Array, hi
         missed = largest = 0.0
         for r in range(m):
             missed, largest = max(missed, abs(left[r])), max(largest, H[r, r])
-        if missed < 1e-15 or not solve_free(H, left, free, _FLOOR * largest, L, move):
+        if missed < 1e-15:
+            break
+        if missed > before and halved < _HALVED:
+            halved += 1
+            for r in range(m):
+                move[r] *= 0.5
+                multipliers[r] -= move[r]
+            continue
+        before, halved = missed, 0
+        if not solve_free(H, left, free, _FLOOR * largest, L, move):
             break
         for r in range(m):
             multipliers[r] += move[r]

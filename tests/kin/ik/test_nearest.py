@@ -286,6 +286,15 @@ def test_nothing_nearer_is_left_free(name):
     check(name, 2, 5 if check is check_descents else 100)
 
 
+@pytest.mark.parametrize("solver", ["auto", "numeric"])
+def test_a_descent_leaves_a_corner_of_the_limits(solver):
+    """Two joints at their limits, of which one has to leave its own: whole steps of the multipliers go astray."""
+    point = [0.00847, 0.06263, 0.25536]
+    seed = [0.9371, 1.0295, 0.3471, 0.0555, 0.6556]
+    best = kin.solve_ik("pioneer5", point, q_seed=seed, task="position", solver=solver).best
+    assert best.distance < 2.5506  # 2.5545 in the corner
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CHECKS | MORE)
 def test_a_dense_scan_finds_hardly_anything_nearer_that_is_left_free(name, monkeypatch):

@@ -38,10 +38,12 @@ def _linearise(k: Array, q: Array, J: Array, e: Array) -> float:
 def _foot(q: Array, J: Array, e: Array, aim: Array, low: Array, high: Array, x: Array) -> None:
     """x ← the point nearest to `aim` with low ≤ x ≤ high and J (x − q) = e.
 
-    By Newton steps on the dual problem, x = clamp(aim + Jᵀ λ). All vectors ``(5,)``, e ``(3,)``, J ``(3, 5)``.
+    By Newton steps on the dual problem, x = clamp(aim + Jᵀ λ), halved where clamps that switch lead a whole one
+    away. All vectors ``(5,)``, e ``(3,)``, J ``(3, 5)``.
     """
-    u = v = w = 0.0
-    for _ in range(12):
+    u = v = w = du = dv = dw = 0.0
+    before, halved = math.inf, 0
+    for _ in range(40):
         # e − J (x − q), and H = J Jᵀ over the joints that are not clamped.
         gu, gv, gw = e[0], e[1], e[2]
         uu = vv = ww = 1e-12
@@ -61,15 +63,25 @@ def _foot(q: Array, J: Array, e: Array, aim: Array, low: Array, high: Array, x: 
                 uv += a * b
                 uw += a * c
                 vw += b * c
+        missed = abs(gu) + abs(gv) + abs(gw)
+        if missed < 1e-15:
+            break
+        if missed > before and halved < 6:
+            halved += 1
+            du, dv, dw = 0.5 * du, 0.5 * dv, 0.5 * dw
+            u, v, w = u - du, v - dv, w - dw
+            continue
+        before, halved = missed, 0
         # The adjugate of H, row by row, over its determinant.
         au, av, aw = vv * ww - vw * vw, vw * uw - uv * ww, uv * vw - vv * uw
         det = uu * au + uv * av + uw * aw
-        if abs(gu) + abs(gv) + abs(gw) < 1e-15 or not det > 0.0:
+        if not det > 0.0:
             break
         bv, bw, cw = uu * ww - uw * uw, uv * uw - uu * vw, uu * vv - uv * uv
-        u += (au * gu + av * gv + aw * gw) / det
-        v += (av * gu + bv * gv + bw * gw) / det
-        w += (aw * gu + bw * gv + cw * gw) / det
+        du = (au * gu + av * gv + aw * gw) / det
+        dv = (av * gu + bv * gv + bw * gw) / det
+        dw = (aw * gu + bw * gv + cw * gw) / det
+        u, v, w = u + du, v + dv, w + dw
 
 
 @jit
