@@ -13,7 +13,7 @@ from app.api.body import versioned
 from app.api.options import AvoidingBody
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
-from app.shared.answers.singularity import ExitsAnswer
+from app.shared.answers.way import ExitsAnswer
 from kin import Robot, leave_singularity
 from kin.transforms import Array
 

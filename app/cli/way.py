@@ -19,8 +19,7 @@ from app.cli.terminal import (
 )
 from app.exports.program_toml import toml_of
 from app.exports.progress import progress_bar
-from app.shared.answers.singularity import ExitsAnswer
-from app.shared.answers.way import way_answer
+from app.shared.answers.way import ExitsAnswer, way_answer
 from kin import InputError, leave_singularity
 from kin.files.numbers import index_of
 from kin.motion import JointTarget, Ptp

@@ -28,7 +28,7 @@ from kin.differential.error import task_error
 from kin.errors import InputError, finite_number
 from kin.escape.keeping import explored, kept_along
 from kin.escape.results import Code, Exit, ExitCause, Exits
-from kin.escape.search import Measure, improved, measure_of, starts, usual_margin
+from kin.escape.search import TIES, Measure, improved, measure_of, starts, usual_margin
 from kin.fk import fk
 from kin.ik import IKOptions, branch_names, branch_of
 from kin.ik.problem import never_cancel
@@ -112,8 +112,9 @@ def _searched(
         return (), ExitCause(code, refused.violations, refused.contact)
     T, inside = fk(space.robot, start), np.clip(start, space.lower, space.upper)
     first = starts(measure, inside, margin, space.lower, space.upper)
-    ends = improved(measure, inside, T, first, margin, space.lower, space.upper, space.cancel)
-    ends = np.concatenate([ends, first])
+    limits = space.lower, space.upper
+    better = [improved(measure, inside, T, first, margin, *limits, ties, space.cancel) for ties in TIES]
+    ends = np.concatenate([*better, first])
     reached = measure.sigma(ends)
     if not (reached >= margin).any():
         return (), ExitCause("margin", largest=float(reached.max()))

@@ -34,7 +34,7 @@ _LOWEST = 3  # singular values that are kept above the margin
 _WEIGHTS = (10.0, 1e3, 1e5, 1e7)  # μ
 _STEPS = 12  # at each weight
 _ABOVE = 1.0005  # the margin that is aimed at, so that rounding does not spoil what was asked for
-_TIES = 1e-3  # ε, as a share of what the deviation weighs
+TIES = (1e-3, 5e-2)  # ε, as shares of what the deviation weighs: a longer motion may deviate more on its way
 _LEAST_TIE = 1e-10
 _STRIDE = 0.3  # of one step
 _DIRECTIONS = 48  # random starts
@@ -120,7 +120,7 @@ def starts(measure: Measure, q: Array, margin: float, lower: Array, upper: Array
 
 def improved(
     measure: Measure, q_start: Array, T: Array, q: Array, margin: float, lower: Array, upper: Array,
-    cancel: Callable[[], None],
+    ties: float, cancel: Callable[[], None],
 ) -> Array:  # fmt: skip
     """Configurations q ``(k, n)`` moved to where the tool deviates least from T ``(4, 4)`` beyond the margin."""
     damping = np.full(len(q), 1e-3)
@@ -130,7 +130,7 @@ def improved(
             cancel()
             J, sigma, slope = measure.slopes(q)
             missing, moved = measure.error(q, T), (q - q_start) * measure.joints
-            tie = np.maximum(_TIES * (missing**2).sum(1) / np.maximum((moved**2).sum(1), 1e-12), _LEAST_TIE)
+            tie = np.maximum(ties * (missing**2).sum(1) / np.maximum((moved**2).sum(1), 1e-12), _LEAST_TIE)
             lack = np.maximum(goal - sigma, 0.0)
             before = (missing**2).sum(1) + tie * (moved**2).sum(1) + strength * (lack**2).sum(1)
             slope = slope * (lack > 0.0)[..., None]
