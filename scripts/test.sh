@@ -100,7 +100,7 @@ fi
 step "ruff check" ruff check .
 step "ruff format" ruff format --check .
 step "the check of static/ (ESLint)" sh scripts/lint.sh
-start mypy nice -n 10 mypy
+start mypy mypy
 wait $programs && programs= || { programs=; fail "what the tests need could not be installed: the message is above."; }
 if [ -z "$selected" ]; then
   finish mypy || fail "mypy failed."
@@ -115,18 +115,15 @@ finish backwards || fail "kernels could not be compiled."
 files_of() {
   grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
 }
-# Pages draw for as long as they wait, and tests wait for them: what computes takes only what they leave of the
-# processors. What measures time comes alone, after all others.
+# Pages draw for as long as they wait: beside other work, browsers take twice as much of the processors. They come first,
+# then what computes, in four processes, as many tests wait for arms that move; then alone what measures time.
 failed=
 in_processes="--dist loadfile --no-loadscope-reorder"
-# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Those
-# that begin together would each do so. What cannot be collected is said by the run.
+pytest -n 3 $in_processes -m "$selected and browser" $(files_of browser) || failed="$failed browsers"
+# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Four that
+# begin together would each do so. What cannot be collected is said by the run.
 pytest --collect-only -qq >/dev/null 2>&1 || :
-# shellcheck disable=SC2086 # several words; several files
-start browsers pytest -n 3 $in_processes -m "$selected and browser" $(files_of browser)
-# shellcheck disable=SC2086
-nice -n 10 pytest -n 4 $in_processes -m "$selected and not browser and not bench" || failed="$failed tests"
-finish browsers || failed="$failed browsers"
+pytest -n 4 $in_processes -m "$selected and not browser and not bench" || failed="$failed tests"
 finish mypy || failed="$failed mypy"
 [ "$selected" = "not slow and not full" ] || pytest -m "$selected and bench" $(files_of bench) || failed="$failed measurements"
 [ -z "$failed" ] || fail "failed:$failed. The messages are above."
