@@ -278,7 +278,7 @@ class Class:
         progress = [each for each in SYMBOLS if each != "away"]
         facts = {each: self._count(progress=each) for each in progress}
         facts |= {"hand up": self._count(hand=True), "away": self._count(presence="away")}
-        facts |= {"never came": len(self.truth) - self._count()}
+        facts |= {"not here yet": len(self.truth) - self._count()}
         for words, count in facts.items():
             if (f"{count} {words}" in chips) != (count > 0):
                 return f"the chips say {chips!r}: {count} {words}"
