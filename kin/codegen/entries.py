@@ -95,17 +95,19 @@ def by_steps(
     """As `solve`, of an arm whose redundancy parameter is a joint, for a value that may be NaN.
 
     Of NaN it is by steps the one nearest to the seed's at which a configuration is inside the limits; if there is
-    none, the seed's.
+    none, the seed's. A seed that meets the pose is an answer, also where the formulas miss it.
     """
     low, high = limits[0][joint], limits[1][joint]
     start, steps = value, 0
     if math.isnan(value):
         start = min(max(seed[joint], low), high)
         steps = HALF_TURN if low <= start - math.pi and start + math.pi <= high else 2 * HALF_TURN
+    own = math.isnan(value) and start == seed[joint]
     for k in range(1, 2 * steps + 2):
         at = start + (k // 2) * (math.pi / HALF_TURN) * (1.0 if k % 2 == 0 else -1.0)
         if low <= at <= high:
-            status, count = solve(rows, inner, model, params, target, seed, limits, at, arcs, found)
+            asked = math.nan if own and k == 1 else at
+            status, count = solve(rows, inner, model, params, target, seed, limits, asked, arcs, found)
             if steps == 0 or status <= SOLVED:  # or INVALID
                 return status, count
     return solve(rows, inner, model, params, target, seed, limits, start, arcs, found)

@@ -233,5 +233,7 @@ def _not_promised(arm: Arm) -> Iterable[str]:
         if arm.alone.stepped:
             step = 180 // entries.HALF_TURN
             yield f"{label}, given or by steps of {step} deg the nearest to the seed's that the limits allow."
+            yield "A range narrower than a step may be missed: then the status is limits or unmet. Where nothing"
+            yield "is found, all steps are tried, which takes tens of milliseconds."
         else:
             yield f"{label}, given or the nearest to the seed's that the limits allow."

@@ -49,6 +49,9 @@ KINBOARD_INLINE double fused(double a, double b, double c) { return fma(a, b, c)
 #else
 KINBOARD_INLINE double fused(double a, double b, double c) { return a * b + c; }
 #endif
+#if FLT_EVAL_METHOD != 0 || defined(__ASSOCIATIVE_MATH__) // sums are not rounded one by one, which `shifted` needs
+static inline void sine_cosine_to(double x, double *sine, double *cosine) { *sine = sin(x); *cosine = cos(x); }
+#else
 KINBOARD_INLINE void sine_cosine_to(double x, double *sine, double *cosine) {
   double shifted = x * 0.6366197723675814 + 6755399441055744.0, k = shifted - 6755399441055744.0;
   int64_t quadrant = bits_of(shifted);
@@ -66,6 +69,7 @@ KINBOARD_INLINE void sine_cosine_to(double x, double *sine, double *cosine) {
   *sine = float_of(bits_of(s) ^ (int64_t)(((uint64_t)quadrant & 2) << 62));
   *cosine = float_of(bits_of(c) ^ (int64_t)((((uint64_t)quadrant + 1) & 2) << 62));
 }
+#endif
 KINBOARD_INLINE double arctan2(double y, double x) { // a negative zero counts as zero
   double across = fabs(y), along = fabs(x);
   bool steep = across > along;
