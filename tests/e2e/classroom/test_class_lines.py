@@ -60,6 +60,7 @@ WALL = 'Object.entries(window.kbLabels).filter(([name]) => name.startsWith("/wal
 SHOWN = """async () => {
   const plain = (node) => node?.textContent.replace(/\\s+/g, " ").trim() ?? "";
   const read = async (path) => (await fetch(`../room/${path}`, { cache: "no-store" })).text();
+  const TABLE = "table:not([data-mistakes], [data-gains])";
   const results = new DOMParser().parseFromString(await read("results"), "text/html");
   return {
     list: [...document.querySelectorAll(".kb-class-list li button")].map((row) => ({
@@ -70,7 +71,7 @@ SHOWN = """async () => {
     chips: plain(document.querySelector(".kb-class-facts")),
     solved: plain(document.querySelector("[data-class-solved]")),
     bar: plain(document.querySelector("[data-class-bar] .kb-class-words")),
-    results: [...results.querySelectorAll("tbody tr")].map((row) => [...row.children].map(plain)),
+    results: [...results.querySelectorAll(`${TABLE} tbody tr`)].map((row) => [...row.children].map(plain)),
     counts: plain(results.querySelector(".lead")),
     file: await read("results.csv"),
   };
