@@ -13,13 +13,14 @@ import kin
 from kin.calibration.chain import Chain
 from kin.calibration.fit import Touches
 from kin.calibration.fixtures import TouchBoard, TouchFixture
+from kin.units import Units
 from tests.kin.calibration.simulated import HOBBY, random_errors, touch, true_sockets
 
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 SO101 = kin.get_robot("so101")
 SHEET = TouchFixture([TouchBoard.sheet("A4")])
-COUNT, BAD = 14, 3
+COUNT, BAD, TYPED = 14, 3, 5
 PROGRAM = re.compile(r'^import kin\n+page = kin\.connect\("(\S+)",\s"(\S+)"\)$', re.MULTILINE)
 
 
@@ -63,7 +64,16 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
             if i in (1, 9):
                 shown.scroll_into_view_if_needed()
                 tab.screenshot(f"calibrate-{size}-posture-{i + 1}")
-            page.get_by_role("button", name="Read", exact=True).click()
+            if i == TYPED:
+                text = " ".join(f"{value:.2f}" for value in np.degrees(q))
+                field = tab.row("Joint values").get_by_role("textbox")
+                field.press_sequentially(text)
+                expect(field).to_have_value(text)
+                page.get_by_role("button", name="Take", exact=True).click()
+                cell = page.get_by_role("table", name=f"Posture {i + 1} of {COUNT}").get_by_role("cell").last
+                expect(cell).to_have_text(Units().angles.text(q[-1], 2))
+            else:
+                page.get_by_role("button", name="Read", exact=True).click()
             expect(table.get_by_role("row")).to_have_count(i + 2)
             if i < COUNT - 1:
                 page.get_by_role("button", name="Next", exact=True).click()

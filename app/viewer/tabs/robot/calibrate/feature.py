@@ -75,7 +75,7 @@ class CalibrateSettings(Settings):
     places: int = number("Places", 1, (1, BOARDS), whole=True, hint=PLACES_HINT)
     plane: bool = flag("Touch the table too", hint="Anywhere, beside the fixture")
     count: int = number("Touches", 20, (1, MOST), whole=True)
-    joints: str = text("Joint values", hint=JOINTS_HINT, longest=400, renew=True, undo="Touch")
+    joints: str = text("Joint values", hint=JOINTS_HINT, longest=400, renew=True)
     run: Run | None = kept(None, to_json=to_json, from_json=from_json, renew=False)
     wanted: int = memory(0)
     measured: tuple[float, ...] | None = memory()
@@ -112,6 +112,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     undo: ClassVar[dict[str, str]] = {
         "on_plan": "Postures to touch in",
         "on_read": "Touch",
+        "on_take": "Touch",
         "on_forget": "Touch left out",
         "on_use": "Calibrated arm",
         "on_stop": "Calibration ended",
@@ -194,6 +195,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         f, s = self.read, self.read.settings
         acts = {
             "Back": self.event(self.on_to, run.at - 1),
+            "Take": self.event(self.on_take),
             "Read": self.event(self.on_read),
             "Leave out": self.event(self.on_forget),
             "Next": self.event(self.on_to, run.at + 1),
@@ -204,7 +206,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             "Leave out": run.read[run.at] is None,
             "Next": run.at == len(run.q) - 1,
         }
-        offered = tuple(name for name in acts if not absent[name])
+        offered = tuple(name for name in acts if not absent.get(name))
         nodes: list[Node] = [
             Html(views.places, (run, f.units), key="places"),
             Html(views.posture, (f.robot, run, s.measured, f.units), key="posture"),
@@ -253,11 +255,6 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         assert self.settings.run is not None
         return self.settings.run
 
-    def changed(self, path: str) -> None:
-        if path == "joints" and self.settings.run is not None and self.settings.joints.strip():
-            robot, units = self.stage.now.robot, self.stage.units
-            self._take(read_joints(self.settings.joints, robot, self._run.what, units))
-
     def on_plan(self) -> None:
         """Choose postures."""
         self.change(wanted=self.settings.count)
@@ -278,6 +275,12 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         words = f"Print it on {paper} at 100 %, and measure the line on it."
         self.stage.notify(Notice("hand", f"{file} is saved", words))
 
+    def on_take(self) -> None:
+        """Take what is typed; raises `InputError`: it cannot be read, and stays."""
+        # On a press alone: the field sends every letter, and 6 is on the way to 6.5.
+        robot, units = self.stage.now.robot, self.stage.units
+        self._take(read_joints(self.settings.joints, robot, self._run.what, units))
+
     def on_read(self) -> None:
         """Take where the connected arm is."""
         if (measured := self.settings.measured) is not None:
@@ -288,7 +291,9 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         self._take(None)
 
     def on_to(self, at: int) -> None:
-        """Show another posture."""
+        """Show another posture; what is typed for this one is taken before. Raises `InputError`."""
+        if self.settings.joints.strip() and self.settings.joints != self._written(self._run):
+            self.on_take()
         self._show(at)
 
     def on_report(self) -> None:
@@ -318,10 +323,14 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     def _show(self, at: int) -> None:
         """Show a posture, and what was read in it."""
         run = self._run.to(at)
+        self.change(run=run, joints=self._written(run))
+        self.rewrite()
+
+    def _written(self, run: Run) -> str:
+        """What was read in the posture on show, as it is typed."""
         scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
         read = zip(run.read[run.at] or (), scales, strict=False)
-        self.change(run=run, joints=" ".join(f"{value * scale:.8g}" for value, scale in read))
-        self.rewrite()
+        return " ".join(f"{value * scale:.8g}" for value, scale in read)
 
     def _take(self, q: tuple[float, ...] | None) -> None:
         """Take what was read in the posture on show; None: nothing."""

@@ -236,13 +236,19 @@ def test_typed_touches_give_the_arm_that_becomes_the_one_of_the_page(
 ) -> None:
     begun(page, run)
     for i, q in enumerate(read):
-        with pytest.raises(InputError, match="joint values: got '1 2'"):
-            page.set("Joint values", "1 2")
-        assert page.run.read[i] is None
-        assert page.feature.settings.joints == "1 2", "what was typed is still there"
+        page.set("Joint values", "1 2")
+        for button in ("Take", "Next") if i < COUNT - 1 else ("Take",):
+            with pytest.raises(InputError, match="joint values: got '1 2'"):
+                page.set("Touch", button)
+            assert page.run.at == i
+            assert page.run.read[i] is None
+            assert page.feature.settings.joints == "1 2", "what was typed is still there"
         page.set("Joint values", typed(q))
+        if i % 2 or i == COUNT - 1:
+            page.set("Touch", "Take")
         if i < COUNT - 1:
             page.set("Touch", "Next")
+        assert page.run.read[i] == pytest.approx(q, abs=1e-7)
     page.until(lambda: page.found is not None and len(page.found.touches) == COUNT)
     page.until(lambda: page.run.course and page.run.course[-1][0] == COUNT)
     expected = page.found.calibration.expected
@@ -264,11 +270,28 @@ def test_typed_touches_give_the_arm_that_becomes_the_one_of_the_page(
     assert [each.at for each in page.run.touches] == list(range(COUNT)), "undo brings the touches back"
 
 
+def test_joint_values_are_taken_on_a_press_and_not_while_they_are_typed(page: Page, run: Run) -> None:
+    begun(page, run)
+    text = "11.5 -78.25 110 -40.5 17.5 -0.5"
+    for end in range(1, len(text) + 1):
+        page.set("Joint values", text[:end])
+        assert page.run.read[0] is None
+        assert page.page.control("Joint values").value == text[:end], "the field is not written into"
+    page.set("Touch", "Take")
+    assert [np.degrees(each.q).tolist() for each in page.run.touches] == [
+        pytest.approx([11.5, -78.25, 110.0, -40.5, 17.5, -0.5])
+    ]
+    assert page.page.control("Joint values").value == text
+    taken = page.run
+    page.set("Touch", "Next")
+    page.set("Touch", "Back")
+    assert page.run.read == taken.read, "nothing typed, nothing taken"
+
+
 def test_a_reload_loses_nothing(page: Page, run: Run, read: list[tuple[float, ...]]) -> None:
     assert page.feature.state() == {}
     begun(page, run.with_read(read[0]).to(1))
-    with pytest.raises(InputError):
-        page.set("Joint values", "1 2 3")
+    page.set("Joint values", "1 2 3")
     state = json.loads(json.dumps(page.feature.state()))
     with bare_page(UR5E) as bare:
         other = Page(bare)
@@ -321,6 +344,7 @@ def test_postures_that_cannot_be_touched_are_said(page: Page) -> None:
 def test_other_units_write_what_was_read_anew(page: Page, run: Run, read: list[tuple[float, ...]]) -> None:
     begun(page, run)
     page.set("Joint values", typed(read[0]))
+    page.set("Touch", "Take")
     page.page.units = Units(degrees=False)
     page.feature.on_style()
     shown = [float(word) for word in page.page.control("Joint values").value.split()]
