@@ -36,7 +36,7 @@ class ProgramSettings(Settings):
         revision: another one replaces what was typed into the fields.
         chart, way: the row to which postures or a way around obstacles are asked for.
         search: number of the search for the way; 0: none has begun.
-        seconds, seed: of the next search.
+        seconds, seed: of the next search; `limits` are those of the last one.
         time: seconds since the beginning of the motion.
         sent: the configuration ``(n,)`` to which the arm was moved last while the program plays.
         leads: whether the arm is on its way to where playing begins.
@@ -64,6 +64,7 @@ class ProgramSettings(Settings):
     search: int = memory(0)
     seconds: float = memory(USUAL, renew=False)
     seed: int = memory(0, renew=False)
+    limits: tuple[float, int] = memory((USUAL, 0), renew=False)
     time: float = memory(0.0)
     playing: bool = memory(False)
     sent: Array | None = memory()

@@ -111,7 +111,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if f.chart is not None:
             found.append(Work("postures", in_background(postures.compute), (f.chart,)))
         if f.way is not None and s.search:
-            args = f.way, s.seconds, s.seed, s.search
+            args = f.way, *s.limits, s.search
             found.append(Work("way", in_background(ways.search), args, poll=REPORT))
         if s.playing:
             found.append(Sweep(self._play_on, self.stage.frame, math.inf))
@@ -123,6 +123,12 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if isinstance(self.facts.work(key).value, ways.Found):
             self.post(("do", self.event(self.on_way), 0, 0))  # a step that can be undone
         super().worked(key)
+
+    def tick(self, now: float) -> None:
+        self.invalidate()
+        if self.settings.way is not None and self.facts.way is None:
+            self.change(way=None, search=0)  # for good: undo would begin the search again
+        super().tick(now)
 
     def started(self) -> None:
         own = self.stage.own
@@ -244,7 +250,8 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
                 self.change(chart=None)
             case "search":
                 if f.way is not None and not f.searches and kin.way.is_installed():
-                    self.change(way=self._asked(f.way.index), search=s.search + 1)
+                    limits = s.seconds, s.seed
+                    self.change(way=self._asked(f.way.index), search=s.search + 1, limits=limits)
             case "close-way":  # a search is cancelled, back to its form
                 self.change(way=f.way if f.searches else None, search=0)
 

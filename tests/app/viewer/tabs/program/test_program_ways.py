@@ -124,6 +124,11 @@ def test_none_found_in_time_is_not_called_none_and_loses_nothing(blocked: FakeBr
     blocked.wait(lambda: "None was found in 0.1 s. That does not mean that there is none" in part(blocked, "way"))
     assert rows(blocked) == 2
     assert 'value="0.1"' in part(blocked, "way"), "it can be searched again"
+    press(blocked, "way-seconds", value=f"{DURATION:g}")
+    press(blocked, "way-seed", value="7")
+    blocked.settle()
+    assert "<progress" not in part(blocked, "way"), "on a press alone"
+    assert "None was found in 0.1 s" in part(blocked, "way")
     press(blocked, "close-way")
     assert part(blocked, "way") == ""
 
@@ -150,6 +155,24 @@ def test_a_search_shows_its_progress_and_is_cancelled(blocked: FakeBrowser) -> N
     press(blocked, "delete", 1)
     assert part(blocked, "way") == "", "another program has another way"
     assert rows(blocked) == 1
+
+
+@needs_ompl
+@pytest.mark.parametrize("lapses", ["row", "obstacle"])
+def test_a_search_that_has_lapsed_does_not_begin_again_with_undo(blocked: FakeBrowser, lapses: str) -> None:
+    press(blocked, "way", 1)
+    press(blocked, "way-seconds", value=f"{DURATION:g}")
+    press(blocked, "search")
+    assert "<progress" in part(blocked, "way")
+    if lapses == "row":
+        press(blocked, "delete", 1)
+    else:
+        blocked.say("feature", ["obstacles", ["add", "sphere", 1], None])
+    blocked.wait(lambda: part(blocked, "way") == "")
+    blocked.say("undo")
+    blocked.wait(lambda: rows(blocked) == 2 and not blocked.script["undo"])
+    blocked.settle()
+    assert part(blocked, "way") == ""
 
 
 @needs_ompl
