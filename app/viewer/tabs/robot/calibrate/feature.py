@@ -101,6 +101,12 @@ class CalibrateFacts(Facts[CalibrateSettings]):
         found: Found | None = self.work("fit").value
         return found
 
+    @property
+    def ready(self) -> Found | None:
+        """What all of the present touches have shown; None: it is not known yet."""
+        run, found = self.settings.run, self.found
+        return found if run is not None and found is not None and found.touches == run.touches else None
+
 
 class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     """See the module."""
@@ -225,7 +231,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             "Stop": self.event(self.on_stop),
         }
         room = len(run.q) + MORE <= MOST and not s.wanted
-        kept = {"Use this arm": f.found is not None, "Save report": f.found is not None, f"{MORE} more": room}
+        kept = {"Use this arm": f.ready is not None, "Save report": f.ready is not None, f"{MORE} more": room}
         offered = tuple(name for name in ends if kept.get(name, True))
         hint = "The arm of the page gets the table that was found; undo takes it back"
         return [*nodes, Buttons("Result", ends, hint, offered, key="result buttons")]
@@ -298,7 +304,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
 
     def on_report(self) -> None:
         """Save what was found as one page."""
-        if (found := self.facts.found) is not None:
+        if (found := self.facts.ready) is not None:
             page = report(found.calibration, [each.socket for each in found.touches])
             self.stage.client.send_file_download("calibration.html", page.encode(), save_immediately=True)
             words = "Every touch, and every error of the table."
@@ -306,7 +312,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
 
     def on_use(self) -> None:
         """Make the arm that was found that of the page; raises `KinematicsError`: it is too long for a link."""
-        if (found := self.facts.found) is None:
+        if (found := self.facts.ready) is None:
             return
         nominal = self.stage.now.robot
         made = own_arm(kin.robot_to_dict(as_own(found.calibration.robot)), nominal.id)

@@ -17,7 +17,17 @@ import kin
 from app.shared.summaries import Summaries
 from app.viewer.own_arm import OwnArm
 from app.viewer.tabs.robot.calibrate.feature import Calibrate
-from app.viewer.tabs.robot.calibrate.run import MOST, Run, Touched, doubt, from_json, planned, read_joints, to_json
+from app.viewer.tabs.robot.calibrate.run import (
+    MORE,
+    MOST,
+    Run,
+    Touched,
+    doubt,
+    from_json,
+    planned,
+    read_joints,
+    to_json,
+)
 from kin import InputError
 from kin.calibration.chain import Chain
 from kin.calibration.fit import Touches
@@ -329,6 +339,29 @@ def test_a_wrong_touch_is_named(page: Page, run: Run, read: list[tuple[float, ..
     page.feature.refresh()
     assert "Touch 5 does not fit the others" in page.html
     assert "✕ left out" in page.html
+
+
+def test_only_what_all_of_the_touches_have_shown_can_be_used(
+    page: Page, run: Run, read: list[tuple[float, ...]]
+) -> None:
+    made = run
+    for i, q in enumerate(read):
+        made = made.to(i).with_read(q)
+    begun(page, made)
+    page.until(lambda: page.feature.facts.ready)
+    page.feature.refresh()
+    assert "Use this arm" in page.page.control("Result").options
+    page.set("Touch", "Leave out")
+    assert page.feature.facts.ready is None, "the next fit has not ended"
+    assert page.page.control("Result").options == (f"{MORE} more", "Stop")
+    page.feature.on_use()
+    page.feature.on_report()
+    assert page.page.own is None
+    assert page.saved == {}
+    page.until(lambda: page.feature.facts.ready)
+    page.feature.refresh()
+    page.set("Result", "Save report")
+    assert list(page.saved) == ["calibration.html"]
 
 
 def test_postures_that_cannot_be_touched_are_said(page: Page) -> None:
