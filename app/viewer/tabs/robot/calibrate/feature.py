@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -75,7 +75,7 @@ class CalibrateSettings(Settings):
     places: int = number("Places", 1, (1, BOARDS), whole=True, hint=PLACES_HINT)
     plane: bool = flag("Touch the table too", hint="Anywhere, beside the fixture")
     count: int = number("Touches", 20, (1, MOST), whole=True)
-    joints: str = text("Joint values", hint=JOINTS_HINT, longest=400, renew=True)
+    joints: str = text("Joint values", hint=JOINTS_HINT, longest=400)
     run: Run | None = kept(None, to_json=to_json, from_json=from_json, renew=False)
     wanted: int = memory(0)
     measured: tuple[float, ...] | None = memory()
@@ -125,8 +125,11 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     }
 
     def started(self) -> None:
-        if (run := self.settings.run) is not None:
-            self.change(run=run.of(self.stage.now.robot))
+        run = self.settings.run
+        if run is not None and (same := run.of(self.stage.now.robot)) is not None:
+            self.change(run=same)
+        else:
+            self.change(run=None, joints="")
 
     def running(self) -> Sequence[Work | Sweep]:
         s, robot = self.settings, self.stage.now.robot
@@ -172,9 +175,12 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             super().worked(key)
         elif key == "plan" and result.finished:
             made: Run = result.value
-            self.change(wanted=0, run=made)
-            self._show(made.at)
-            self.stage.fit_view((), made.spots)
+            if run is None:
+                self.change(wanted=0, run=made)
+                self._show(made.at)
+                self.stage.fit_view((), made.spots)
+            else:  # something may be being typed for the posture on show
+                self.change(wanted=0, run=replace(made, at=run.at, course=run.course))
         elif key == "fit" and run is not None and self.facts.found is not None:
             self.change(run=run.found(self.facts.found))
 

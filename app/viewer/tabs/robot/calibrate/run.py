@@ -112,9 +112,8 @@ class Run:
         return tuple(Touch(i, socket, q) for i, (socket, q) in enumerate(made) if q is not None)
 
     def of(self, robot: Robot) -> Run | None:
-        """The same for this arm; None: it has another table."""
-        geometry = [(each.rows, each.base, each.tool) for each in (self.robot, robot)]
-        return replace(self, robot=robot) if geometry[0] == geometry[1] else None
+        """The same for this arm; None: it has another table. Names, limits and speeds do not count."""
+        return replace(self, robot=robot) if _table(self.robot) == _table(robot) else None
 
     def with_read(self, q: tuple[float, ...] | None) -> Run:
         """The same with this reading in the posture on show; None: it was not touched."""
@@ -144,6 +143,12 @@ class Run:
             read=self.read + (None,) * len(plan.q),
             at=len(self.q),
         )
+
+
+def _table(robot: Robot) -> object:
+    """What decides where the tip is: touches are of arms that have it in common."""
+    rows = [(row.theta, row.d, row.a, row.alpha, row.kind) for row in robot.rows]
+    return robot.convention, rows, robot.expansion.tolist(), robot.base, robot.tool
 
 
 def planned(robot: Robot, what: Touched, count: int, run: Run | None, cancel: Callable[[], None]) -> Run:

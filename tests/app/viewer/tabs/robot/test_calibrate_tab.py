@@ -6,6 +6,7 @@ import html
 import json
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -339,6 +340,36 @@ def test_a_wrong_touch_is_named(page: Page, run: Run, read: list[tuple[float, ..
     page.feature.refresh()
     assert "Touch 5 does not fit the others" in page.html
     assert "✕ left out" in page.html
+
+
+def test_what_is_being_typed_stays_when_further_postures_come(page: Page, run: Run) -> None:
+    begun(page, run.to(3))
+    page.set("Joint values", "11.5 -78")
+    page.set("Result", f"{MORE} more")
+    page.until(lambda: len(page.run.q) == COUNT + MORE)
+    assert page.run.at == 3
+    assert page.page.control("Joint values").value == "11.5 -78"
+    assert page.feature.settings.wanted == 0
+
+
+def test_an_arm_with_the_same_geometry_keeps_the_touches_and_what_is_typed(
+    page: Page, run: Run, read: list[tuple[float, ...]]
+) -> None:
+    begun(page, run.with_read(read[0]).to(1))
+    page.set("Joint values", "11.5 -78")
+    rows = [replace(row, name=f"my {row.name}", velocity=1.0) for row in UR5E.rows]
+    rows[0] = replace(rows[0], limits=(-3.0, 3.0))
+    same = replace(UR5E, name="My arm", rows=tuple(rows), motors=(), pendant=(), ros_joints=())
+    page.page.use(same)
+    page.feature.on_robot()
+    assert page.run.robot is same
+    assert page.run.read[0] == read[0]
+    assert page.page.control("Joint values").value == "11.5 -78"
+    rows[1] = replace(rows[1], a=rows[1].a - 0.001)
+    page.page.use(replace(same, rows=tuple(rows)))
+    page.feature.on_robot()
+    assert page.feature.settings.run is None
+    assert page.feature.settings.joints == ""
 
 
 def test_only_what_all_of_the_touches_have_shown_can_be_used(
