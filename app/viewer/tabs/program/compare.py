@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -68,7 +67,6 @@ class Straight:
         return bool(np.abs(after - before).max() > _JUMP * largest)
 
 
-@lru_cache(32)
 def other_motion(program: Program, plan: Plan, loop: bool, choice: Choice, zone: float) -> Motion:
     """The other motion of a program and its plan; it may be refused."""
     robot, segments = plan.motion.robot, program.segments

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -27,7 +27,6 @@ _LOOKS = 200  # times in a spline at which its distance from a point is looked a
 SAME = 1e-6  # rad or m: a locked joint has this value
 LOOSE, SAMPLES = 1e-4, 400  # rad or m on the way, and where it is looked at
 FINEST, MOST_SAMPLES = 0.01, 1200  # s between two samples of the tool's path; samples at most
-KEPT = 32  # plans of all visitors; each is asked for again and again while its program is on show
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +170,6 @@ class Asked:
     arm: Arm
 
 
-@lru_cache(KEPT)
 def plan(
     program: Program,
     robot: Robot,
@@ -256,7 +254,6 @@ class Fault:
     way_helps: bool = False
 
 
-@lru_cache(KEPT)
 def find_fault(plan: Plan, locked: Sequence[float | None], units: Units) -> Fault | None:
     """The planner's refusal, or a locked joint that would have to move; None: nothing.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 from app.exports.motion_snippets import SNIPPETS
@@ -76,8 +76,27 @@ class ProgramSettings(Settings):
         return Shown(self.path, self.ghosts, self.frames)
 
 
+class Planned:
+    """The last plan of one page, its fault, and the motion that it is compared with: each frame asks for them.
+
+    A cache of all pages would need room for as many as may be open. With less room, each frame would plan anew.
+    """
+
+    def __init__(self) -> None:
+        self.plan = lru_cache(1)(plan)
+        self.find_fault = lru_cache(1)(find_fault)
+        self.other_motion = lru_cache(1)(other_motion)
+
+
+@dataclass(frozen=True, eq=False)
 class ProgramFacts(Facts[ProgramSettings]):
-    """The program of the robot on show, and its motion."""
+    """The program of the robot on show, and its motion.
+
+    Attributes:
+        planned: what the facts before these have planned.
+    """
+
+    planned: Planned = field(default_factory=Planned)
 
     @property
     def key(self) -> str:
@@ -102,7 +121,7 @@ class ProgramFacts(Facts[ProgramSettings]):
             return None
         rested = self.work("obstacles")
         obstacles = rested.value if rested.finished else self.arm.obstacles
-        return plan(self.program, self.robot, self.settings.loop, self.arm.avoid, obstacles)
+        return self.planned.plan(self.program, self.robot, self.settings.loop, self.arm.avoid, obstacles)
 
     @property
     def motion(self) -> Motion | None:
@@ -129,7 +148,7 @@ class ProgramFacts(Facts[ProgramSettings]):
         """Why the program cannot be driven."""
         if self.plan is None:
             return None
-        return find_fault(self.plan, self.arm.options.constraints.locks(self.robot) or (), self.units)
+        return self.planned.find_fault(self.plan, self.arm.options.constraints.locks(self.robot) or (), self.units)
 
     @property
     def playable(self) -> Motion | None:
@@ -159,7 +178,7 @@ class ProgramFacts(Facts[ProgramSettings]):
         s = self.settings
         if s.compare is None or self.program is None or self.plan is None or self.whole is None:
             return None
-        return other_motion(self.program, self.plan, s.loop, s.compare, s.zone)
+        return self.planned.other_motion(self.program, self.plan, s.loop, s.compare, s.zone)
 
     @property
     def chosen(self) -> int | None:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from app.viewer.tabs.program.files import motion_file, read
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.plot import plot_html
 from app.viewer.tabs.program.program import MOST, PAUSE, Segments, recorded, replaced, targets
-from app.viewer.tabs.program.settings import ProgramFacts, ProgramSettings
+from app.viewer.tabs.program.settings import Planned, ProgramFacts, ProgramSettings
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
@@ -76,6 +77,13 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
     undo: ClassVar[dict[str, str]] = {"on_way": "Find a way"}
 
     # Declared
+
+    @cached_property
+    def _planned(self) -> Planned:
+        return Planned()
+
+    def sources(self) -> Mapping[str, Any]:
+        return {"planned": self._planned}
 
     def panel(self) -> Sequence[Node]:
         f, s, units = self.read, self.settings, self.stage.units

@@ -5,27 +5,32 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from bare_page import bare_page
 from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
 from app.exports.program_toml import toml_of
+from app.exports.snippets import Service
 from app.viewer.arm import Arm
+from app.viewer.frames import Frames
 from app.viewer.own_arm import clean
 from app.viewer.tabs.program import program as model
 from app.viewer.tabs.program.compare import CHOICES, Choice, jerk_is_infinite, other_motion
 from app.viewer.tabs.program.plan import Asked, plan
 from app.viewer.tabs.program.program import as_kind, begun, opened, recorded, unpack
 from app.viewer.tabs.program.scene import shared
-from app.viewer.tabs.program.settings import ProgramFacts, ProgramSettings
+from app.viewer.tabs.program.settings import Planned, ProgramFacts, ProgramSettings
+from app.viewer.tabs.program.tab import ProgramTab
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.program.views import QUANTITIES, assumption, comparison
 from kin import InputError
 from kin.ik.details import OrientationNotMet
-from kin.motion import Circ, Dwell, Lin, PoseTarget, Program, Ptp, Spline, motion_limits, program_to_dict
+from kin.motion import Circ, Dwell, Lin, Motion, PoseTarget, Program, Ptp, Spline, motion_limits, program_to_dict
 from kin.motion.details import NotReached
 from kin.typed import EntryError
 from kin.units import DEFAULT_UNITS
@@ -416,10 +421,13 @@ def test_a_file_of_poses_keeps_them_but_for_the_start() -> None:
     assert row == line.segments[0]
 
 
+PLANNED = Planned()
+
+
 def facts_of(**settings: object) -> ProgramFacts:
-    """The facts of a page that shows `ROWS`, with these settings."""
+    """The facts of one page that shows `ROWS`, with these settings."""
     given = ProgramSettings(programs={PIONEER.id: Program(ROWS)}, **settings)  # type: ignore[arg-type]
-    return ProgramFacts(given, Arm(PIONEER, PIONEER.q_home, PIONEER.q_home))
+    return ProgramFacts(given, Arm(PIONEER, PIONEER.q_home, PIONEER.q_home), planned=PLANNED)
 
 
 def test_playing_keeps_time_stops_at_the_end_and_begins_again_in_a_loop() -> None:
@@ -439,6 +447,39 @@ def test_plans_are_shared_by_facts_and_rows_that_are_gone_are_not_open() -> None
     assert (facts.chosen, facts_of(chosen=4).chosen) == (3, None)
     assert facts.progress is facts_of().progress
     assert facts_of(own=True).program is None, "a visitor's own arm has a program of its own"
+
+
+def test_a_page_that_plays_plans_once_however_many_pages_have_other_programs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    planned: list[Program] = []
+    plan_motion = kin.plan_motion
+
+    def counted(robot: kin.Robot, program: Program, *args: Any, **options: Any) -> Motion:
+        planned.append(program)
+        return plan_motion(robot, program, *args, **options)
+
+    monkeypatch.setattr(kin, "plan_motion", counted)
+    pages = [(Program((ROWS[0], replace(ROWS[1], speed=0.1 + 0.01 * k))), Planned()) for k in range(40)]
+    arm = Arm(PIONEER, PIONEER.q_home, PIONEER.q_home)
+    for frame in range(3):
+        for program, own in pages:
+            settings = ProgramSettings(programs={PIONEER.id: program}, time=0.1 * frame, compare="zone")
+            facts = ProgramFacts(settings, arm, planned=own)
+            assert facts.fault is None
+            assert facts.other is not None
+        assert len(planned) == 2 * len(pages), "each program, and what it is compared with"
+
+
+def test_the_facts_of_a_page_share_what_was_planned() -> None:
+    with bare_page(PIONEER) as page:
+        page.service, page.frames = Service("http://127.0.0.1"), Frames()  # type: ignore[attr-defined]
+        tab = page.open(ProgramTab)
+        before = tab.facts
+        tab.change(programs={PIONEER.id: Program(ROWS)})
+        tab.invalidate()
+        assert tab.facts is not before
+        assert tab.facts.planned is before.planned
 
 
 def test_what_is_asked_for_a_row_goes_with_the_program_and_the_obstacles() -> None:
