@@ -28,7 +28,7 @@ from kin.typed import EntryError, ReadError, elements, interpret, read_element
 from kin.units import Unit, Units, general
 
 DIGITS = 2
-_SLACK = 1e-9  # rad or m by which a typed value may be outside the limits
+_ROUNDED = 0.51  # of the last digit that the pendant shows: so far may what is typed be from what was shown
 REMEMBERED = 200  # fields of sliders, also of those that were replaced
 # Marks the label of a locked joint; invisible. static/input.js presses such a button, on which viewer.css draws a
 # padlock.
@@ -178,9 +178,12 @@ class JointSliders:
         except ReadError as error:
             raise EntryError(title, error.sentence, error.readings) from None
         q = from_pendant(robot, shown)
-        for joint, unit, value in zip(robot.joints, units, q.tolist(), strict=True):
+        slack = np.array([unit.read(_ROUNDED * unit.step(1)) for unit in units])
+        if robot.pendant_map is not None:
+            slack = np.abs(robot.pendant_map.back) @ slack
+        for joint, unit, value, off in zip(robot.joints, units, q.tolist(), slack.tolist(), strict=True):
             low, high = joint.limits or (-math.pi, math.pi)
-            if not low - _SLACK <= value <= high + _SLACK:
+            if not low - off <= value <= high + off:
                 valid = f"Valid: {unit.number(low)} … {unit.text(high)}."
                 raise EntryError(
                     title, f"Joint {joint.name} would have {unit.text(value)}, outside its limits. {valid}"

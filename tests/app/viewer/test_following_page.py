@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from bare_page import bare_page
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -16,9 +18,11 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.own_arm import own_arm, pack, unpack
+from app.viewer.panel.joints import JointSliders
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.robot.edits import EditError, changed_rows, typed
+from kin.typed import EntryError
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -121,3 +125,26 @@ def test_the_page_shows_what_the_pendant_shows(tab: FakeBrowser) -> None:
     assert tab.value("3 J3") == 30.0
     tab.choose(ROBOT.name)
     assert "Pendant:" not in said()
+
+
+@pytest.mark.parametrize("units", [Units(), Units(degrees=False)], ids=["degrees", "radians"])
+def test_what_the_pendant_shows_at_a_limit_can_be_typed_as_it_is_shown(units: Units) -> None:
+    fanuc = kin.get_robot("lrmate200id")
+    inside = np.radians(0.028)  # the ends of J1 are shown rounded outwards: 169.972° as 170.0, 2.9666 rad as 2.967
+    rows = tuple(
+        replace(row, limits=(row.limits[0] + inside, row.limits[1] - inside)) if row.limits else row
+        for row in fanuc.rows
+    )
+    robot = replace(fanuc, rows=rows)
+    with bare_page(robot) as page:
+        gui = page.client.gui
+        arguments = [False] * robot.n, units, page.post, page.fence
+        sliders = JointSliders(gui, [gui.add_folder("Joints")], robot, robot.q_home, *arguments)
+        for q in (robot.lower, robot.upper):
+            shown = [units.angles.number(value) for value in kin.motors.to_pendant(robot, q).tolist()]
+            found = sliders.read_pendant(" ".join(shown))
+            assert found == pytest.approx(q, abs=1.1 * units.angles.read(units.angles.step(1)))
+            assert robot.clip(found).tolist() == found.tolist()
+            shown = [units.angles.number(1.005 * value) for value in kin.motors.to_pendant(robot, q).tolist()]
+            with pytest.raises(EntryError, match="outside its limits"):
+                sliders.read_pendant(" ".join(shown))
