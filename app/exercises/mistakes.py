@@ -31,6 +31,7 @@ from kin.units import Units, general
 
 CHANCES = (0.02, 0.01)  # that a random number within ± 50 % of the answer is explained by one mistake, by a pair
 NEAR, BESIDE_ZERO = 0.5, 10.0  # where random numbers are, of the answer, and of its tolerance if it is about zero
+ROUNDING = 1e-6  # of the tolerance: numbers that differ by less are the same
 _SYMBOLS = {"theta": "θ", "d": "d", "a": "a", "alpha": "α"}
 _DEGREE = CONSTANTS["deg"]
 
@@ -110,6 +111,10 @@ class Case:
             frames[-1] = kin.fk(robot, q)
             yield clause, replace(self.variant, facts=Facts(robot, q, pose(frames)))
 
+    def function(self, name: str) -> Function:
+        """What the calculator does for a name: after another mistake not the built-in function."""
+        return self.variant.functions.get(name, FUNCTIONS[name])
+
     def calculated(self, clause: str, functions: dict[str, Function]) -> Clauses:
         """Other functions in place of those of the expressions."""
         yield clause, replace(self.variant, functions={**self.variant.functions, **functions})
@@ -148,7 +153,7 @@ def _angle_unit(clause: str, factor: float) -> Callable[[Case], Clauses]:
     """Angles that a calculator takes for `factor` times as large ones."""
 
     def row(case: Case) -> Clauses:
-        functions = {name: _of_scaled(name, factor) for name in ("sin", "cos", "tan")}
+        functions = _of_scaled(case, factor)
         q, turns = case.variant.q, case.variant.robot.revolute & case.asks_arm
         for words, mistaken in case.calculated(clause, functions):
             yield words, replace(mistaken, q=np.where(turns, factor * q, q))
@@ -156,8 +161,11 @@ def _angle_unit(clause: str, factor: float) -> Callable[[Case], Clauses]:
     return row
 
 
-def _of_scaled(name: str, factor: float) -> Function:
-    return lambda angle: FUNCTIONS[name](factor * angle)
+def _of_scaled(case: Case, factor: float) -> dict[str, Function]:
+    def scaled(function: Function) -> Function:
+        return lambda angle: function(factor * angle)
+
+    return {name: scaled(case.function(name)) for name in ("sin", "cos", "tan")}
 
 
 def _length_unit(case: Case) -> Clauses:
@@ -227,7 +235,7 @@ def _previous(case: Case) -> Clauses:
 
 def _sine(case: Case) -> Clauses:
     pairs = (("sin", "cos"), ("cos", "sin"), ("asin", "acos"), ("acos", "asin"))
-    yield from case.calculated("sine and cosine exchanged", {name: FUNCTIONS[other] for name, other in pairs})
+    yield from case.calculated("sine and cosine exchanged", {name: case.function(other) for name, other in pairs})
 
 
 def _atan(case: Case) -> Clauses:
@@ -236,7 +244,7 @@ def _atan(case: Case) -> Clauses:
 
 def _double_angle(case: Case) -> Clauses:
     for factor, words in ((2.0, "twice the angle"), (0.5, "half the angle")):
-        yield from case.calculated(words, {name: _of_scaled(name, factor) for name in ("sin", "cos", "tan")})
+        yield from case.calculated(words, _of_scaled(case, factor))
 
 
 def _diameter(case: Case) -> Clauses:
@@ -356,14 +364,15 @@ class Models:
 
     @cached_property
     def pairs(self) -> list[Model]:
-        """Two of the likeliest each."""
+        """Two of the likeliest each; not those that lead where one alone does: then the other changes nothing."""
         case = replace(self.case, by_table=False)
         off = self.without.union(code for code, row in ROWS.items() if not row.likely)
+        alone = np.array([one.values for one in self.single]).reshape(-1, len(self.tolerances))
         found: dict[frozenset[str], Model] = {}
         for first in self._apart(self._made(case, off)):
             for then in self._made(replace(case, variant=first.variant), off):
                 key = frozenset(first.clauses + then.clauses)
-                if len(key) == 2:
+                if len(key) == 2 and not self._is_one_of(alone, then.values):
                     codes, clauses = first.codes + then.codes, first.clauses + then.clauses
                     found.setdefault(key, Model(codes, clauses, then.variant, then.values))
         return self._apart(found.values())
@@ -384,6 +393,10 @@ class Models:
     def _gaps(self, values: Array, others: Array) -> Array:
         gaps = values - others
         return np.abs(np.remainder(gaps + math.pi, 2.0 * math.pi) - math.pi if self.whole_turns else gaps)
+
+    def _is_one_of(self, rows: Array, values: Array) -> bool:
+        same = self._gaps(rows, values) <= ROUNDING * np.array(self.tolerances)
+        return bool(np.any(np.all(same, axis=1)))
 
     def _accepted(self, models: list[Model], chance: float) -> Array:
         """How far a number may be from that of a mistake ``(k,)``."""

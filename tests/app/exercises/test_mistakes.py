@@ -34,6 +34,7 @@ def judged(
     unit: str = "m",
     vary: str = "",
     q: str = "",
+    tolerance: float = 0.001,
 ) -> Verdict:
     """The verdict on these numbers; the joints are at T1, T2 and, of three, 0.3 rad."""
     exercise = parse_exercise(
@@ -55,7 +56,7 @@ p = {{ choose = [400], unit = "mm" }}
 value = {value}
 labels = {[str(i) for i in range(len(value))]}
 unit = "{unit}"
-tolerance = 0.001
+tolerance = {tolerance}
 method = "Compute."
 {more}
 """,
@@ -160,6 +161,26 @@ def test_two_mistakes_at_once_are_named_if_none_alone_is_it() -> None:
     verdict = judged([math.cos(T2) - 0.5 * math.sin(T1)], ["0.5*cos(t1) + sin(t2)"])
     assert verdict.cause == "sign + sine for cosine"
     assert "with sine and cosine exchanged and with the other sign of 20°." in verdict.reason
+
+
+HEIGHT = """h = { choose = [700], unit = "mm" }
+l2 = { choose = [300], unit = "mm" }"""
+
+
+def test_a_second_mistake_that_changes_nothing_is_not_named() -> None:
+    """A cosine does not know the sign of its angle."""
+    verdict = judged([0.4443], ["h + p*cos(t2)"], vary=HEIGHT, tolerance=0.005)
+    assert (verdict.reason, verdict.cause) == ("Too small. Compute.", "")
+
+
+def test_both_of_two_mistakes_with_the_functions_count() -> None:
+    value = ["h + p*cos(t2) + l2*sin(t2)"]
+    twice, both = 0.7 + 0.4 * math.cos(2 * T2) + 0.3 * math.sin(2 * T2), 0.7 + 0.4 * math.sin(2 * T2)
+    both += 0.3 * math.cos(2 * T2)
+    verdict = judged([twice + 0.0011], value, vary=HEIGHT, tolerance=0.005)
+    assert (verdict.reason, verdict.cause) == ("Too small. Compute.", "")
+    verdict = judged([both], value, vary=HEIGHT, tolerance=0.005)
+    assert verdict.cause == "sine for cosine + double angle"
 
 
 def test_nothing_is_named_if_two_mistakes_lead_there() -> None:
