@@ -1,4 +1,4 @@
-"""What a class got wrong: for each exercise the reasons of wrong answers, in the words that the students read."""
+"""What a class got wrong: for each exercise the reasons of wrong answers, in the words for one of the students."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from app.classroom.results.table import Member
 from app.classroom.work import Attempt
 
 MOST = 6  # reasons of an exercise
-NUMBERS = re.compile(r"[−-]?\d+(?:[.,]\d+)?")
+# Numbers of the arm's parts are the same for all students, others are each student's own.
+NUMBERS = re.compile(
+    r"\b((?:row|joint|frame|link|column|axis) \d+"
+    r"|(?:rows|joints|frames|links|columns|axes) \d+(?:(?:,| and| to) \d+)*)"
+    r"|[−-]?\d+(?:[.,]\d+)?",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -44,21 +50,18 @@ class Mistakes:
 def mistakes(members: Iterable[Member], attempts: Sequence[Attempt]) -> list[Mistakes]:
     """Of each exercise with a wrong answer, in the order of the first ones; attempts come in the order of time."""
     names = {one.seat: one.alias for one in sorted(members, key=lambda one: one.number)}
-    wrong: dict[str, dict[str, set[str]]] = {}
-    said: dict[str, str] = {}  # the words with numbers, of those without
+    wrong: dict[str, dict[str, tuple[str, set[str]]]] = {}  # exercise, words without numbers: words, seats
     for one in attempts:
         if one.seat in names and one.score < 1.0 and not one.gave_up:
-            kind = NUMBERS.sub("", one.verdict)
-            said.setdefault(kind, one.verdict)
-            wrong.setdefault(one.exercise, {}).setdefault(kind, set()).add(one.seat)
+            reasons = wrong.setdefault(one.exercise, {})
+            reasons.setdefault(NUMBERS.sub(r"\1", one.verdict), (one.verdict, set()))[1].add(one.seat)
     first = {key: score for key, score in first_scores(attempts).items() if key[0] in names}
     found = []
     for exercise, reasons in wrong.items():
         scores = [score for (_, asked), score in first.items() if asked == exercise]
-        listed = [
-            Reason(said[kind], tuple(names[seat] for seat in names if seat in seats))
-            for kind, seats in reasons.items()
-        ]
-        listed.sort(key=lambda one: -len(one.students))
-        found.append(Mistakes(exercise, len(scores), sum(s >= 1.0 for s in scores), tuple(listed[:MOST])))
+        listed = sorted(reasons.values(), key=lambda reason: -len(reason[1]))[:MOST]
+        said = tuple(
+            Reason(words, tuple(names[seat] for seat in names if seat in seats)) for words, seats in listed
+        )
+        found.append(Mistakes(exercise, len(scores), sum(s >= 1.0 for s in scores), said))
     return found

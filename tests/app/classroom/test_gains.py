@@ -171,6 +171,9 @@ def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
     assert f"g = {(0.7 - 0.25) / (1 - 0.25):.2f}" in page
     assert "1 answered both" in page
     assert "What was wrong?" in page
+    assert (
+        "in the words for the first student who got each: those of the most students first, at most 6 of" in page
+    )
     assert '<td class="n">0 of 1</td><td class="n">1</td><td class="why">Too large.</td>' in page
     named = [html.unescape(text) for text in re.findall(r'<b class="of"[^>]*>(.*?)</b>', page)]
     first, second = ([ALL.get(key).title for key in pair] for pair in PAIRS)  # type: ignore[union-attr]

@@ -181,6 +181,39 @@ def test_reasons_that_differ_by_the_numbers_of_each_student_are_one() -> None:
     assert mistakes(members, given)[0].reasons == (Reason(said[0], ("Di", "Ed")),)
 
 
+def test_a_reason_has_the_numbers_of_its_own_exercise() -> None:
+    members = [Member("d", "Di", 1), Member("e", "Ed", 2)]
+    given = [
+        replace(attempt("d", "y", 0.0, 1.0), verdict="You get this with 0.5 m left out."),
+        replace(attempt("e", "z", 0.0, 2.0), verdict="You get this with 0.7 m left out."),
+    ]
+    assert [(one.exercise, one.reasons[0].words) for one in mistakes(members, given)] == [
+        ("y", given[0].verdict),
+        ("z", given[1].verdict),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("rows 1 and 2 exchanged", "rows 2 and 3 exchanged", False),
+        ("rows 1 and 2 exchanged", "rows 1 and 3 exchanged", False),
+        ("the other sign of joint 1", "the other sign of joint 2", False),
+        ("Joint 1 is outside", "Joint 2 is outside", False),
+        ("This is frame 1.", "This is frame 2.", False),
+        ("the axis of joint 12 is off by 3°", "the axis of joint 12 is off by 7.5°", True),
+        ("the other sign of −0.4 m in row 3", "the other sign of 0,25 m in row 3", True),
+        ("joint 2 at 30° and joint 3 at 10°", "joint 2 at 45° and joint 3 at -5°", True),
+    ],
+)
+def test_the_numbers_of_rows_joints_and_frames_are_no_students_own(one: str, other: str, same: bool) -> None:
+    members = [Member("d", "Di", 1), Member("e", "Ed", 2)]
+    given = [
+        replace(attempt(s, "a", 0.0, 1.0), verdict=words) for s, words in zip("de", (one, other), strict=True)
+    ]
+    assert len(mistakes(members, given)[0].reasons) == (1 if same else 2)
+
+
 @given(st.text(max_size=12), st.text(max_size=12))
 @example("=1+1", "-2")
 @example("@SUM(A1)", "\t=1")

@@ -18,6 +18,7 @@ from app.classroom import COOKIE, ClassroomUnavailable, Hub
 from app.classroom.clock import now
 from app.classroom.courses import Courses, SentExercises
 from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, pairs_of
+from app.classroom.results.mistakes import MOST as MOST_REASONS
 from app.classroom.results.mistakes import Mistakes, mistakes
 from app.classroom.results.table import Row, csv_of, rows
 from app.classroom.work import Attempt
@@ -65,6 +66,7 @@ class Results:
             pairs=[[titles.get(key, key) for key in pair] for pair in pairs],
             gains=[_compared(row) for row in found[: MOST + 1]],
             mistakes=[(titles.get(one.exercise, one.exercise), one) for one in wrong],
+            most_reasons=MOST_REASONS,
         )
 
     async def download(self, request: Request) -> Response:
