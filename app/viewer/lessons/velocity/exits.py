@@ -28,6 +28,9 @@ STEP_HINT = (
 EXIT_HINT = "Several postures can be reached; draws where this way leads"
 DRIVE_HINT = "Moves the arm to the pale one"
 STAY_HINT = "Leaves the arm where it is"
+DRIVEN = Notice("reached", "Stepping out", "The arm moves, the tool does not.")
+STAYED = Notice("hand", "Stopped on the way out", "The arm stays where it is.")
+CHANGED = Notice("limits", "Stopped on the way out", "What the arm avoids has changed. Press Step out again.")
 
 
 def searching_html() -> str:
@@ -62,8 +65,13 @@ def locked(arm: Arm, shown: Exit) -> Notice | None:
     return Notice("limits", "Not moved: a joint is locked", f"Unlock {held[0]} first.") if held else None
 
 
+def driven(found: Exits, q: Array) -> Exit | None:
+    """The way out with these waypoints; None: it is none any more."""
+    return next((each for each in found.exits if np.array_equal(each.q, q)), None)
+
+
 def left(found: Exits, shown: Exit, units: Units) -> Notice:
-    """The message about a way out that is driven."""
+    """The message at the end of a way out."""
     said = tool_motion(found.robot, shown, units)
     posture = f"; posture {short(shown.posture)}" if shown.posture else ""
     return Notice("reached", "Out of the singularity", f"{said[0].upper()}{said[1:]}{posture}.")

@@ -134,7 +134,8 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             return Folder(None, [button], key="step out", visible=f.state != "far")
         if found is None:
             return Folder(None, [Html(exits.searching_html)], key="step out")
-        choices = {str(k + 1): self.event(self.on_exit, k) for k in range(len(found.exits))}
+        ways = 0 if self.settings.driven is not None else len(found.exits)
+        choices = {str(k + 1): self.event(self.on_exit, k) for k in range(ways)}
         return Folder(None, [
             Html(exits.exits_html, (found, self.settings.exit, self.stage.units)),
             *([Buttons("Way out", choices, exits.EXIT_HINT, of=id(found))] if len(choices) > 1 else []),
@@ -170,9 +171,12 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         self.change(leaving=self.stage.now.goal, exit=0, driven=None, runs=False)
 
     def on_exit(self, which: int) -> None:
-        self.change(exit=which)
+        if self.settings.driven is None:
+            self.change(exit=which)
 
     def on_stay(self) -> None:
+        if self.settings.driven is not None:
+            self.stage.notify(exits.STAYED)
         self.change(leaving=None, driven=None)
 
     def on_drive(self) -> None:
@@ -241,14 +245,19 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     def _drive(self, seconds: float) -> None:
         """A frame of the way out; another motion of the arm ends it."""
         made, found = self.settings.driven, self.facts.exits
-        if made is None or found is None or not np.array_equal(made[0][made[1]], self.stage.now.goal):
+        here = made is not None and np.array_equal(made[0][made[1]], self.stage.now.goal)
+        way = exits.driven(found, made[0]) if made is not None and found is not None else None
+        if made is None or found is None or way is None or not here:
             self.change(driven=None, leaving=None)
+            if here:
+                self.stage.notify(exits.CHANGED)
             return
-        q, passed = made[0], exits.after(*made, seconds)
-        done = exits.left(found, found.exits[self.settings.exit], self.stage.units)
-        self.change(driven=(q, passed))
-        self.stage.move_to(q[passed], done, at_once=True)
-        if passed == len(q) - 1:
+        passed = exits.after(*made, seconds)
+        arrived = passed == len(way.q) - 1
+        self.change(driven=(way.q, passed))
+        notice = exits.left(found, way, self.stage.units) if arrived else exits.DRIVEN
+        self.stage.move_to(way.q[passed], notice, at_once=True)
+        if arrived:
             self.change(driven=None, leaving=None)
 
     def _push(self, force: Sequence[float]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,20 +12,27 @@ from bare_page import STORE, BarePage, bare_page
 
 import kin
 from app.shared.summaries import Summaries
-from app.viewer.lessons.velocity.exits import after
+from app.viewer.lessons.velocity.exits import after, left
+from app.viewer.lessons.velocity.facts import VelocityFacts
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 
 WRIST = np.array([0.3, -1.2, 1.4, -0.7, 0.0, 0.2])  # of a UR5e
 UPRIGHT = np.array([0.1, 0.0, np.pi / 2, -1.2, 0.3, 1.0, 0.4])  # of an iiwa
 
 
+@pytest.fixture(scope="module")
+def summaries() -> Iterator[Summaries]:
+    """Those of all pages: each search is made once."""
+    made = Summaries(threads=1)
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def page() -> Iterator[BarePage]:
+def page(summaries: Summaries) -> Iterator[BarePage]:
     with bare_page(STORE.get("ur5e")) as opened:
-        summaries = Summaries(threads=1)
         opened.summaries = summaries  # type: ignore[attr-defined]
         yield opened
-        summaries.close()
 
 
 def step_out(page: BarePage, q: np.ndarray) -> kin.escape.Exits:
@@ -78,6 +86,59 @@ def test_a_way_out_that_keeps_the_tool_is_driven_by_its_waypoints(page: BarePage
     assert np.allclose(seen[-1], found.exits[0].q[-1])
     assert np.abs(kin.fk("iiwa14", np.array(seen)) - T).max() < 1e-8
     assert np.abs(np.diff(np.array([UPRIGHT, *seen]), axis=0)).max() < 0.06
+
+
+def drive(page: BarePage, ways: int = 2) -> tuple[VelocityLesson, kin.escape.Exits]:
+    """Step out of an upright arm, and drive the first frame of its first way, which keeps the tool."""
+    page.use(STORE.get("iiwa14"))
+    found = step_out(page, UPRIGHT)
+    assert len(found.exits) >= ways
+    assert found.exits[0].keeps_tool
+    lesson = page.feature
+    assert isinstance(lesson, VelocityLesson)
+    lesson.on_drive()
+    lesson._drive(1 / 30)
+    assert not np.array_equal(page.now.goal, UPRIGHT)
+    return lesson, found
+
+
+def test_the_status_says_that_the_arm_is_out_at_the_end_of_the_way_alone(page: BarePage) -> None:
+    _, found = drive(page)
+    page.rest()
+    assert np.allclose(page.now.goal, found.exits[0].q[-1])
+    assert {one.title for one in page.notices[:-1]} == {"Stepping out"}
+    assert page.notices[-1].title == "Out of the singularity"
+
+
+def test_no_other_way_is_chosen_while_one_is_driven(page: BarePage) -> None:
+    lesson, found = drive(page)
+    lesson.on_exit(1)
+    lesson.refresh()
+    lesson.schedule()
+    assert "Stay here" in text(page)
+    assert "Way out" not in text(page)
+    assert "Drive there" not in text(page)
+    page.rest()
+    assert page.notices[-1] == left(found, found.exits[0], page.units)
+
+
+def test_who_stays_on_the_way_is_not_said_to_be_out(page: BarePage) -> None:
+    lesson, _ = drive(page)
+    at = page.now.goal
+    lesson.on_stay()
+    page.rest()
+    assert np.array_equal(page.now.goal, at)
+    assert page.notices[-1].title == "Stopped on the way out"
+
+
+def test_a_way_that_is_none_any_more_is_not_driven_on(page: BarePage, monkeypatch: pytest.MonkeyPatch) -> None:
+    lesson, found = drive(page)
+    at = page.now.goal
+    monkeypatch.setattr(VelocityFacts, "exits", replace(found, exits=()))
+    page.rest()
+    assert np.array_equal(page.now.goal, at)
+    assert lesson.settings.driven is None
+    assert page.notices[-1].detail == "What the arm avoids has changed. Press Step out again."
 
 
 def test_the_offer_ends_when_the_arm_is_moved_and_is_not_made_far_from_a_singularity(page: BarePage) -> None:
