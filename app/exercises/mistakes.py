@@ -169,7 +169,10 @@ def _of_scaled(case: Case, factor: float) -> dict[str, Function]:
 
 
 def _length_unit(case: Case) -> Clauses:
-    for name, value, shown in case.numbers(("length",)):
+    lengths = [one for one in case.numbers(("length",)) if one[1]]
+    if len(lengths) + (case.asks_arm and any(row.d or row.a for row in case.variant.robot.rows)) < 2:
+        return  # there are no other lengths
+    for name, value, shown in lengths:
         yield from case.with_number(f"{shown} in millimetres, and other lengths in metres", name, 1e3 * value)
 
 

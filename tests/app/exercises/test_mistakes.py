@@ -50,6 +50,7 @@ text = "What is it?"
 t1 = {{ choose = [20], unit = "deg" }}
 t2 = {{ choose = [50], unit = "deg" }}
 p = {{ choose = [400], unit = "mm" }}
+long = {{ choose = [2000], unit = "mm" }}
 {vary}
 
 [answer]
@@ -104,7 +105,7 @@ MADE: list[tuple[str, list[str], list[float], Robot]] = [
     ("left out", ["x", "y"], planar(0.0, T2), PLANAR),
     ("degrees", ["x", "y"], planar(20.0, 50.0), PLANAR),
     ("radians", ["x", "y"], planar(T1 * math.pi / 180, T2 * math.pi / 180), PLANAR),
-    ("millimetres", ["hypot(p, 2)"], [math.hypot(400.0, 2.0)], PLANAR),
+    ("millimetres", ["hypot(p, long)"], [math.hypot(400.0, 2.0)], PLANAR),
     ("offset", XYZ, point(*rows(offset=0.0)), ARM),
     ("convention", XYZ, point(*rows(craig=True)), ARM),
     ("rows exchanged", XYZ, point(*rows(order=(0, 2, 1))), ARM),
@@ -165,6 +166,13 @@ def test_two_mistakes_at_once_are_named_if_none_alone_is_it() -> None:
 
 HEIGHT = """h = { choose = [700], unit = "mm" }
 l2 = { choose = [300], unit = "mm" }"""
+
+
+def test_a_length_without_others_is_not_in_another_unit_than_they() -> None:
+    assert judged([math.hypot(400.0, 2.0)], ["hypot(p, 2)"]).cause == ""
+    quill = 'q = ["t1", "t2", "p", "0"]'
+    verdict = judged([0.387 - 400.0], ["z"], kin.get_robot("scara"), q=quill)
+    assert verdict.cause == "millimetres", "the arm has others"
 
 
 def test_a_second_mistake_that_changes_nothing_is_not_named() -> None:
