@@ -60,7 +60,7 @@ def drawn(robot: Robot, shown: Exit) -> Node:
 
 def locked(arm: Arm, shown: Exit) -> Notice | None:
     """What keeps the arm from a way out: a joint that is locked and would have to move; None: nothing."""
-    moves = np.abs(shown.q[-1] - shown.q[0]) > _MOVES
+    moves = np.ptp(shown.q, axis=0) > _MOVES  # also of a joint that comes back
     held = [label(arm.robot, i) for i, lock in enumerate(arm.locks) if lock and moves[i]]
     return Notice("limits", "Not moved: a joint is locked", f"Unlock {held[0]} first.") if held else None
 

@@ -12,9 +12,11 @@ from bare_page import STORE, BarePage, bare_page
 
 import kin
 from app.shared.summaries import Summaries
-from app.viewer.lessons.velocity.exits import after, left
+from app.viewer.arm import Arm
+from app.viewer.lessons.velocity.exits import after, left, locked
 from app.viewer.lessons.velocity.facts import VelocityFacts
 from app.viewer.lessons.velocity.lesson import VelocityLesson
+from kin.escape import Exit
 
 WRIST = np.array([0.3, -1.2, 1.4, -0.7, 0.0, 0.2])  # of a UR5e
 UPRIGHT = np.array([0.1, 0.0, np.pi / 2, -1.2, 0.3, 1.0, 0.4])  # of an iiwa
@@ -157,6 +159,17 @@ def test_a_locked_joint_is_not_moved(page: BarePage) -> None:
     page.rest()
     assert page.notices[-1].detail == "Unlock 5 wrist 2 first."
     assert np.array_equal(page.now.goal, WRIST)
+
+
+def test_a_locked_joint_that_would_come_back_is_not_moved_either() -> None:
+    q = np.zeros((3, 6))
+    q[1, 1] = 0.2
+    q[:, 4] = 0.0, 0.1, 0.3
+    way = Exit(q, 0.1, True, 0.0, 0.0, 0.0, None, 0.4)
+    for joint, words in ((1, "Unlock 2 shoulder first."), (3, None)):
+        arm = Arm(STORE.get("ur5e"), q[0], q[0], locks=tuple(i == joint for i in range(6)))
+        found = locked(arm, way)
+        assert (found and found.detail) == words
 
 
 def test_frames_pass_whole_waypoints_at_most_as_fast_as_joints_may() -> None:
