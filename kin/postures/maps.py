@@ -277,8 +277,8 @@ class _Solver:
             expected = "an arm with as many joints that move as its task has dimensions; lock the others"
             raise InputError("robot", f"{robot.id} with {arm.n} joints that move", expected)
         form = None if task == "position" else named_form_of(arm)
-        if form is None and task != "position":
-            raise InputError("robot", robot.id, "an arm with a closed form")
+        if task != "position" and (form is None or not form.handles(TASK_CODES[task])):
+            raise InputError("robot", robot.id, f"an arm with a closed form for its task, {task}")
         return cls(movable, form, task, respect_limits, cancel)
 
     @property

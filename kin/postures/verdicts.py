@@ -30,6 +30,7 @@ from kin.postures.loops import Search, search_loop
 from kin.postures.movable import Movable
 from kin.robot import Robot
 from kin.solvers import closed_form_of
+from kin.solvers.contract import TASK_CODES
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 from kin.workspace.region import checked_integer
@@ -191,6 +192,11 @@ def _searched(
 
 
 def _is_known_by_signs(arm: Robot) -> bool:
-    """Whether the closed form of the table as it is has the signs of the determinant's factors as postures."""
+    """Whether the closed form of the table as it is has the signs of the determinant's factors as postures.
+
+    One that solves another task than the arm's proves nothing: a tool beside axis 5 moves when joint 5 turns.
+    """
     form = None if arm.coupled else closed_form_of(arm)
-    return form is not None and form.off == 0.0 and form.name in _BY_SIGNS
+    if form is None or form.off != 0.0 or form.name not in _BY_SIGNS:
+        return False
+    return form.handles(TASK_CODES[natural_task(arm)])

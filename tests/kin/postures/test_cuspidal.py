@@ -83,6 +83,8 @@ def check_loop(robot: kin.Robot, found: kin.postures.Cuspidality, locked: tuple[
     assert np.allclose(start[:3, 3], end[:3, 3], atol=1e-8)
     if robot.n - len(locked) == 6:
         assert np.allclose(start, end, atol=1e-8)
+    if natural_task(robot) == "approach":
+        assert np.allclose(start[:3, 2], end[:3, 2], atol=1e-8)
     assert apart(q[0], q[-1], robot.revolute) > 0.05
     assert np.array_equal(found.in_limits, robot.in_limits(q, 1e-9).all())
     J = np.delete(task_jacobian(robot, q) if not locked else kin.jacobian(robot, q), locked, axis=-1)
@@ -106,6 +108,16 @@ def test_arms_known_to_be_cuspidal_have_a_loop_inside_their_limits(name):
 def test_families_whose_postures_are_signs_are_not_cuspidal(name):
     found = kin.cuspidal(name)
     assert (found.verdict, found.evidence, found.poses) == ("no", "factors", 0)
+
+
+def test_signs_prove_nothing_about_another_task():
+    """With the tool beside axis 5 the signs are postures of the pose, but the task is a point and a direction."""
+    tool = kin.pose_from_xyz_rpy([0.05, 0.03, 0.1], [0.5, 0.4, 0.0])
+    robot = kin.get_robot("so100").with_mounted(tool)
+    found = kin.cuspidal(robot)
+    assert found.evidence == "loop"
+    check_loop(robot, found)
+    assert kin.cuspidal("so101", poses=1).evidence == "search"
 
 
 @pytest.mark.parametrize("name", ["ur5", "puma560", "stanford"])

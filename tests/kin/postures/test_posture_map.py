@@ -167,6 +167,7 @@ def test_a_map_reports_its_progress_and_can_be_cancelled():
     ("call", "field"),
     [
         (partial(kin.posture_map, "panda"), "robot"),
+        (partial(kin.posture_map, "so101", resolution=8), "robot"),  # its closed form is for whole poses
         (partial(kin.posture_map, "ur5", resolution=7), "resolution"),
         (partial(kin.posture_map, "ur5", normal=[0.0, 0.0, 0.0]), "normal"),
         (partial(kin.posture_map, "ur5", tilted(9.0, 0.0, 0.0), normal=[1.0, 0.0, 0.0]), "target"),
