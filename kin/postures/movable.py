@@ -32,7 +32,7 @@ class Movable:
         lower, upper, _ = constraints.bounds(robot)
         rows = list(robot.rows)
         for i, k in enumerate(robot.joint_rows):
-            if rows[k].limits is not None:
+            if np.isfinite(upper[i] - lower[i]):  # a joint without limits of its own may be given some
                 rows[k] = replace(rows[k], limits=(float(lower[i]), float(upper[i])))
         locked = {i: x for i, x in enumerate(constraints.locks(robot) or ()) if x is not None}
         narrowed = replace(robot, rows=tuple(rows))

@@ -155,12 +155,14 @@ def test_the_loop_of_an_arm_with_a_locked_joint_keeps_it():
     check_loop(robot, found, locked=(6,))
 
 
-def test_narrower_limits_hold_for_the_loop():
-    robot = kin.get_robot("gofa")
-    limits = [(-0.5, 0.5), *[None] * 5]
-    found = kin.cuspidal(robot, limits=limits)
+@pytest.mark.parametrize(("name", "joint"), [("gofa", 0), ("jaco2", 0), ("jaco2", 3)])
+def test_given_limits_hold_for_the_loop(name, joint):
+    """Joints 1 and 4 of the Jaco 2 have none of their own."""
+    limits = [None] * 6
+    limits[joint] = (-0.2, 0.2)
+    found = kin.cuspidal(name, limits=limits)
     assert found.in_limits
-    assert (np.abs(found.loop[:, 0]) <= 0.5 + 1e-9).all()
+    assert (np.abs(found.loop[:, joint]) <= 0.2 + 1e-9).all()
 
 
 @pytest.mark.parametrize("name", ["ur5", "gofa", "stanford", "cylindrical", "pioneer5", "prr", "rrp"])

@@ -139,6 +139,17 @@ def test_a_locked_joint_makes_an_arm_of_seven_one_of_six():
         assert np.allclose(kin.fk(robot, region.q), found.plane.poses(robot, region.place[None])[0], atol=1e-3)
 
 
+def test_a_joint_without_limits_may_be_given_some():
+    limits = [None] * 5 + [(-0.2, 0.2)]
+    found = kin.posture_map("ur3", limits=limits, resolution=16)
+    assert found.regions
+    for region in found.regions:
+        assert (np.abs(region.q[:, 5]) <= 0.2 + 1e-9).all()
+    assert 0 < found.counts.sum() < kin.posture_map("ur3", resolution=16).counts.sum()
+    plane = kin.posture_map("ur3", joints=(4, 5), limits=limits, resolution=8).plane
+    assert plane.window[1] == (-0.2, 0.2)
+
+
 def test_labels_and_letters():
     parts = np.array([[0, 0, 1], [1, 0, 1], [1, 0, 0]])
     label = _labels(parts)
