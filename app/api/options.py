@@ -21,7 +21,7 @@ from app.api.arms.frames import FrameName, FramesBody, WorkpiecesBody
 from app.api.problems import invalid
 from app.api.schemas import Number, OneOf, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
-from app.shared.problems import FieldError, from_input_error
+from app.shared.problems import FieldError, from_input_error, show
 from app.shared.settings import Settings
 from kin import IKOptions, InputError, JointConstraints, Robot
 from kin.collision.obstacles import KINDS, LONGEST_NAME, MOST_OBSTACLES, Shape, checked_obstacles
@@ -121,6 +121,13 @@ class Target(schemas.Body):
         except InputError as error:
             prefix = "" if error.field.startswith(field) else f"{field}."
             raise invalid(from_input_error(error, prefix)) from None
+
+    def in_world(self, task: Task | None, field: str, maker: str = "") -> tuple[Task, Array]:
+        """`resolve` where targets are in the world frame; raises 422 for one that names another frame, too."""
+        if self.frame not in (None, WORLD):
+            error = FieldError(field=f"{field}.frame", value=show(self.frame), expected=f'"{WORLD}"')
+            raise invalid(error, hint="Here poses are in the world frame.")
+        return self.resolve(task, field, maker)
 
     def _given(self) -> list[str]:
         """The fields that say where the tool should be."""

@@ -83,8 +83,8 @@ class PostureMapRequest(Body):
 
     target: Target | None = Field(
         None,
-        description="A pose of the tool: the section contains its point, and the tool keeps its orientation. By "
-        "default that of the home configuration.",
+        description="A pose of the tool in the world frame: the section contains its point, and the tool keeps "
+        "its orientation. By default that of the home configuration.",
     )
     normal: Vector3 | None = Field(
         None,
@@ -134,7 +134,7 @@ async def postures(request: Request, robot: Robot, body: PostureMapRequest) -> R
 
 def _map(robot: Robot, body: PostureMapRequest, deadline: Deadline) -> Response:
     try:
-        pose = None if body.target is None else body.target.resolve("pose", "target", robot.maker)[1]
+        pose = None if body.target is None else body.target.in_world("pose", "target", robot.maker)[1]
         found = posture_map(robot, pose, cancel=deadline.check, **body.keywords)
     except InputError as error:
         raise invalid(from_input_error(error)) from None

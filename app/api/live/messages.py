@@ -300,8 +300,5 @@ def _robot(given: str | RobotDescription, store: Store) -> Robot | dict[str, Any
 
 def _target(given: Target) -> tuple[Array, bool]:
     """T_world_tool ``(4, 4)``, and whether it has an orientation."""
-    if given.frame not in (None, "world"):
-        error = FieldError(field="target.frame", value=show(given.frame), expected='"world"')
-        raise invalid(error, hint="A program says poses in the world frame.")
-    task, T = given.resolve(None, "target")
+    task, T = given.in_world(None, "target")
     return T, task != "position"

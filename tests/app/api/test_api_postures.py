@@ -87,6 +87,8 @@ def test_a_map_as_a_file(client, kind, media_type, begin):
         ({"normal": [0, 0, 0]}, "normal"),
         ({"format": "gif"}, "format"),
         ({"target": {"position": [0.4, 0.1, 0.3]}}, "target"),
+        ({"target": {"position": [0.4, 0.1, 0.3], "rpy": [0, 0, 0], "frame": "base"}}, "target.frame"),
+        ({"target": {"position": [0.4, 0.1, 0.3], "rpy": [0, 0, 0], "frame": "tool"}}, "target.frame"),
         ({"target": {"position": [0.0, 0.0, 9.0], "rpy": [0, 0, 0]}, "normal": [0, 0, 1]}, "target"),
     ],
 )
