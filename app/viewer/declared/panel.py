@@ -89,7 +89,8 @@ class Button:
 class Buttons:
     """A group of buttons, and the events by their labels. Another `of` makes a new group: late events are void.
 
-    `offered` are the labels on show, all if it is None: a click on one that has just gone still counts.
+    `offered` are the labels on show, all if it is None: a click on one that has just gone still counts. Without
+    any of them there is no group.
     """
 
     label: str
@@ -203,6 +204,8 @@ class PanelView:
         for order, node in enumerate(nodes, 1):
             kind = type(node)
             number = numbers[kind] = numbers.get(kind, 0) + 1
+            if isinstance(node, Buttons) and node.offered == ():
+                continue  # viser shows no group without a button
             name = node.path if isinstance(node, Control) else number
             key: Hashable = (kind, node.key or name)
             gone.discard(key)
@@ -255,7 +258,7 @@ class PanelView:
             case Button(label=label, hint=hint, visible=visible):
                 return label, hint, visible
             case Buttons(label=label, hint=hint, events=events, offered=offered):
-                return label, hint, offered or tuple(events)
+                return label, hint, tuple(events) if offered is None else offered
             case Folder(label=label, visible=visible):
                 return label, visible
             case Html(args=args):
@@ -273,7 +276,7 @@ class PanelView:
             case Button(label=label, hint=hint, visible=visible):
                 return {"label": label, "hint": hint, "visible": visible}
             case Buttons(label=label, hint=hint, events=events, offered=offered):
-                return {"label": label, "hint": hint, "options": offered or tuple(events)}
+                return {"label": label, "hint": hint, "options": tuple(events) if offered is None else offered}
             case Folder(label=label, visible=visible):
                 return {"label": label, "visible": visible}
         return {}

@@ -325,6 +325,40 @@ def test_a_click_on_what_was_just_offered_counts(page: BarePage) -> None:
     assert toy.settings.count == 8
 
 
+class Choosing(DeclaredFeature[Knobs, Sums]):
+    key, title, settings_of, facts_of = "choosing", "Choosing", Knobs, Sums
+
+    def panel(self) -> Sequence[Node]:
+        go = {"a": self.event(self.on_go), "b": self.event(self.on_go)}
+        offered = ("a",) if self.settings.runs else ()
+        return [
+            Control("runs"),
+            Buttons("Go", go, offered=offered),
+            Buttons("Home", {"c": self.event(self.on_go)}),
+        ]
+
+    def on_go(self) -> None:
+        self.change(count=self.settings.count + 1)
+
+
+def test_a_group_of_buttons_of_which_none_is_offered_is_not_there(page: BarePage) -> None:
+    page.open(Choosing)
+    assert list(handles(page)) == ["Run", "Home"]
+    home = page.control("Home")
+    for runs in (True, False):
+        page.set("Run", runs)
+        page.rest()
+        assert ("Go" in handles(page)) == runs
+        assert page.control("Home") is home
+    page.set("Run", True)
+    page.rest()
+    assert page.control("Go").options == ("a",)
+    page.press("Go", "a")
+    page.rest()
+    assert page.feature is not None
+    assert page.feature.settings.count == 7
+
+
 def test_undo_names_and_links(page: BarePage) -> None:
     toy = page.open(Toy)
     assert toy.step_name(("at", "force.on", 3)) == "Force"
