@@ -141,6 +141,7 @@ class Practising(Feature):
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Ghost"
 
     def on_robot(self) -> None:
+        self._drawing.arm(None)  # of an arm that is not on show
         self._update()
 
     def on_style(self) -> None:
@@ -266,9 +267,11 @@ class Practising(Feature):
                 self._drawing.place(sheet.ghost)
             verdict = exercise.judge(variant, given, self.stage.units)
         except EntryError as error:
+            self._drawing.arm(None)
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)
             return
         except InputError as error:
+            self._drawing.arm(None)
             sheet.error = f"{str(error)[:1].upper()}{str(error)[1:]}."
             return
         sheet.verdict = verdict

@@ -178,6 +178,14 @@ def test_the_arm_of_a_mistaken_answer_is_drawn_until_the_next_answer(server: int
         tab.wait(lambda: [np.allclose(tab.local(name)[:3, 3], tool, atol=1e-6) for name in drawn(tab)] == [True])
         press(tab, ["fields", 3], [["1", "1"]])
         tab.wait(lambda: not drawn(tab))
+        press(tab, ["fields", 4], [[f"{1000 * x:.1f}" for x in tool[:2]]])
+        tab.wait(lambda: bool(drawn(tab)))
+        press(tab, ["fields", 5], [["1", "x"]])
+        tab.wait(lambda: not drawn(tab))
+        press(tab, ["fields", 6], [[f"{1000 * x:.1f}" for x in tool[:2]]])
+        tab.wait(lambda: bool(drawn(tab)))
+        tab.choose(kin.get_robot("ur5e").name)
+        tab.wait(lambda: not drawn(tab))
 
 
 def test_the_arm_is_the_answer_where_a_posture_is_asked(server: int) -> None:
