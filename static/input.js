@@ -194,6 +194,7 @@
   function openForm(kind) {
     const box = form();
     if (!box) return;
+    if (!box.hidden) mark(false); // opened by another button
     box.hidden = false;
     box.dataset.typed = kind;
     for (const node of box.querySelectorAll("[data-for]")) node.hidden = !node.dataset.for.split(" ").includes(kind);

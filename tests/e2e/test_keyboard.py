@@ -14,7 +14,7 @@ import kin
 
 pytestmark = pytest.mark.browser
 
-PIONEER, PUMA = kin.get_robot("pioneer5"), kin.get_robot("puma560")
+PIONEER, PUMA, FANUC = (kin.get_robot(name) for name in ("pioneer5", "puma560", "lrmate200id"))
 ELBOW = "2 rotating elbow"
 # viser takes the small arrows of a number field out of the tab order; the arrow keys do the same there. A folder
 # that closes is inert at once; if the browser leaves its transition out, its controls stay displayed, unseen.
@@ -213,6 +213,23 @@ def test_a_target_is_typed_and_moved_by_keys(tab: Tab) -> None:
     text.press("Escape")
     expect(text).to_be_hidden()
     tab.choose("Target must match", "Full pose")
+
+
+def test_of_the_buttons_that_open_the_same_form_one_is_expanded(tab: Tab) -> None:
+    page = tab.page
+    tab.show(FANUC)
+    pendant = page.get_by_role("button", name="Type joint values as the pendant shows them")
+    target = page.get_by_role("button", name="Type a target")
+    pendant.click()
+    expect(pendant).to_have_attribute("aria-expanded", "true")
+    target.click()
+    expect(target).to_have_attribute("aria-expanded", "true")
+    expect(pendant).to_have_attribute("aria-expanded", "false")
+    pendant.click()
+    expect(page.locator("[data-typed] textarea")).to_have_accessible_name("Joint values on the pendant")
+    expect(target).to_have_attribute("aria-expanded", "false")
+    pendant.click()
+    expect(page.locator("[data-typed] textarea")).to_be_hidden()
 
 
 @pytest.mark.full
