@@ -35,6 +35,17 @@ def simulated() -> np.ndarray:
     return found.q
 
 
+def take(tab: Tab, at: int, q: np.ndarray) -> None:
+    """Type what the joints read, letter by letter, and take it."""
+    page, text = tab.page, " ".join(f"{value:.2f}" for value in np.degrees(q))
+    field = tab.row("Joint values").get_by_role("textbox")
+    field.press_sequentially(text)
+    expect(field).to_have_value(text)
+    page.get_by_role("button", name="Take", exact=True).click()
+    cells = page.get_by_role("table", name=f"Posture {at + 1} of {COUNT}").get_by_role("cell")
+    expect(cells.last).to_have_text(Units().angles.text(q[-1], 2))
+
+
 @pytest.mark.parametrize("size", ["desktop", "phone"])
 def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.FixtureRequest, size: str) -> None:
     tab: Tab = request.getfixturevalue(size)
@@ -65,13 +76,7 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
                 shown.scroll_into_view_if_needed()
                 tab.screenshot(f"calibrate-{size}-posture-{i + 1}")
             if i == TYPED:
-                text = " ".join(f"{value:.2f}" for value in np.degrees(q))
-                field = tab.row("Joint values").get_by_role("textbox")
-                field.press_sequentially(text)
-                expect(field).to_have_value(text)
-                page.get_by_role("button", name="Take", exact=True).click()
-                cell = page.get_by_role("table", name=f"Posture {i + 1} of {COUNT}").get_by_role("cell").last
-                expect(cell).to_have_text(Units().angles.text(q[-1], 2))
+                take(tab, i, q)
             else:
                 page.get_by_role("button", name="Read", exact=True).click()
             expect(table.get_by_role("row")).to_have_count(i + 2)
