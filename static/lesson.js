@@ -12,13 +12,13 @@
     if (feature === "exercises" && ANSWERS.includes(kind)
       && !dispatchEvent(new CustomEvent("kinboard-answer", { detail, cancelable: true }))) return;
     expectWords(node, kind);
-    channel.send("feature", [feature, [kind, ...rest, ++serial], value]);
+    channel.send("feature", [feature, [kind, ...rest, ++serial], value], kind === "fields" ? forgetting(node) : null);
   }
 
   function press(button) {
     if (button.ariaDisabled === "true") return;
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
-    if (kind === "restart") keepDrafts([]);
+    if (kind === "restart" && !button.closest("[data-feature]")) keepDrafts(drafts.filter(([each]) => !each.startsWith(`${lessonOnShow()} `)));
     if (kind === "check") check(button);
     else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")), ...(key === undefined ? [] : [key]));
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
@@ -68,11 +68,11 @@
     drafts = now.slice(0, MOST_DRAFTS);
     try { sessionStorage.setItem(DRAFTS, JSON.stringify(drafts)); } catch { /* only this page has it */ }
   }
-  /** The question of a typed cell, with its numbers; undefined: it is no answer. */
+  const lessonOnShow = () => document.querySelector("[data-guide=goal]")?.dataset.lesson;
+  /** The question of a typed cell, with its words in a lesson, with its variant in an exercise; undefined: it is no answer. */
   function questionOf(cell) {
     const asked = cell.closest("[data-question]");
-    const lesson = document.querySelector("[data-guide=goal]")?.dataset.lesson;
-    return asked ? `${lesson} ${asked.dataset.question} ${asked.querySelector("legend")?.textContent}` : cell.closest("[data-of]")?.dataset.of;
+    return asked ? `${lessonOnShow()} ${asked.dataset.question} ${asked.querySelector("legend")?.textContent}` : cell.closest("[data-of]")?.dataset.of;
   }
   const draftOf = (question) => drafts.find(([each]) => each === question)?.[1];
   addEventListener("input", ({ target }) => {
@@ -81,6 +81,15 @@
     const typed = { ...draftOf(question), [target.dataset.cell]: [target.value, target.defaultValue] };
     keepDrafts([[question, typed], ...drafts.filter(([each]) => each !== question)]);
   });
+  /** What forgets the draft of a lesson's question once the service has it. Exercises do not show an answer again. */
+  function forgetting(node) {
+    const asked = node.closest("[data-question]");
+    const sent = asked && draftOf(questionOf(node));
+    return sent ? (error) => {
+      if (error || asked.querySelector("[aria-invalid]")) return; // it was not read
+      keepDrafts(drafts.filter(([, each]) => each !== sent));
+    } : null;
+  }
   let filled = new WeakMap(); // cell → what the service said when it was looked at
   function fill() {
     for (const cell of document.querySelectorAll(`.kb-question ${TYPED}`)) {
