@@ -180,7 +180,11 @@ class PostureMap:
         )
         x, y = ((units.of(bool(turn)) if self.plane.joints is not None else units.lengths) for turn in turns)
         if not self.regions:
-            return "No posture anywhere in this plane."
+            solved = int((self.counts > 0).sum())
+            if solved == 0:
+                return "No posture at any node of this plane."
+            nodes = count(solved, "node has", "nodes have")
+            return f"No region of {_SMALL} nodes or more: {nodes} a posture."
         parts = []
         for each in self.regions:
             number = count(each.count, "posture", "postures")

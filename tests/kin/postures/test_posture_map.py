@@ -130,6 +130,19 @@ def test_regions_have_their_postures():
     assert found.reason.startswith(f"{len(found.regions)} regions. A: 8 postures, ")
 
 
+def test_without_a_region_the_nodes_are_counted():
+    """Few poses of a section have the one orientation of five joints; a tilted tool has none."""
+    assert kin.posture_map("pioneer5", resolution=8).reason == (
+        "No region of 4 nodes or more: one node has a posture."
+    )
+    assert kin.posture_map("pioneer5", resolution=12).reason == (
+        "No region of 4 nodes or more: 2 nodes have a posture."
+    )
+    turned = kin.pose_from_xyz_rpy([0.2, 0.1, 0.2], [1.0, 0.0, 0.0])
+    empty = kin.posture_map("pioneer5", turned, normal=[0.0, 0.0, 1.0], resolution=8)
+    assert (empty.counts.max(), empty.reason) == (0, "No posture at any node of this plane.")
+
+
 def test_a_locked_joint_makes_an_arm_of_seven_one_of_six():
     robot = kin.get_robot("panda")
     found = kin.posture_map(robot, locked=[None] * 6 + [0.8], resolution=12)
