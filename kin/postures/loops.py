@@ -44,7 +44,7 @@ class Search:
     Attributes:
         q: ``(k, n)`` the corners of a loop; None if none was found.
         least: no singular value on the loop is smaller; lengths count as shares of the arm's size.
-        poses, pairs: how many poses were solved, and how many pairs of postures were tried.
+        poses, pairs: how many random poses were solved, and how many pairs of their postures tried.
     """
 
     q: Array | None
@@ -66,7 +66,7 @@ def search_loop(
 
     Args:
         robot: the arm.
-        poses: how many to solve.
+        poses: how many random ones to solve.
         seed: of the random poses.
         within_limits: whether the loop keeps the joint limits. Else joints turn either way.
         near: ``(k, n)`` configurations whose poses are tried first, with corners among them.
@@ -77,16 +77,16 @@ def search_loop(
     options = IKOptions(task=natural_task(robot), respect_limits=within_limits)
     if within_limits:
         near = near[robot.in_limits(near)]
-    solved_poses = len(near)
+    solved_poses = 0  # random ones, as are those whose pairs count
     for done in range(-_AT_ONCE if len(near) else 0, poses, _AT_ONCE):
         progress(max(done, 0) / poses)
-        q = near if done < 0 else robot.random_q(rng, _AT_ONCE)
-        solved_poses += _AT_ONCE * (done >= 0)
+        q = near if done < 0 else robot.random_q(rng, min(_AT_ONCE, poses - done))
+        solved_poses += len(q) * (done >= 0)
         T = fk(robot, q)
         targets = T[:, :3, 3] if options.task == "position" else T
         solved = solve_many(robot, targets, options, cancel=cancel)
         starts, ends = _pairs(robot, [np.array([s.q for s in each.solutions]) for each in solved])
-        pairs += len(starts)
+        pairs += len(starts) * (done >= 0)
         for corners in (0, 1):
             cancel()
             among = q if done < 0 else robot.random_q(rng, _CORNERS * _PAIRS)

@@ -190,8 +190,18 @@ def test_a_motion_through_a_singularity_is_not_verified():
 
 def test_none_found_says_how_far_was_looked():
     found = kin.cuspidal("rpp", poses=40)
-    assert (found.verdict, found.evidence, found.poses, found.loop) == ("none found", "search", 128, None)
+    assert (found.verdict, found.evidence, found.poses, found.loop) == ("none found", "search", 80, None)
     assert "does not prove a no" in found.reason
+
+
+def test_the_search_solves_no_more_random_poses_than_asked_for():
+    """Configurations around cusps, which are tried first, are none of them."""
+    robot = kin.get_robot("ur5")
+    near = robot.random_q(np.random.default_rng(7), 3)
+    for poses in (1, 5, 33):
+        found = loops.search_loop(robot, poses, 1, False, near, lambda part: None)
+        assert (found.q, found.poses) == (None, poses)
+        assert found.pairs <= poses * 12  # eight postures: four of either sign
 
 
 def test_a_search_reports_its_progress_and_can_be_cancelled():
