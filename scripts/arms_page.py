@@ -45,9 +45,8 @@ CUSPIDAL = """
 A cuspidal arm can change its posture without meeting a singularity
 ([background](background/singularities.md#cuspidal-arms)). Arms with seven joints are judged with the last one
 locked at its home value. *Yes* comes with a verified loop, *no* with a proof; *none found* is neither. The
-literature says the same of those it names: yes of the GoFa (A. Elias, J. Wen, arXiv 2501.18505), CRX, Jaco 2 and
-xArm 6; no of arms of Universal Robots, of the PUMA 560, and of the Panda with a locked joint (P. Wenger,
-D. Chablat, arXiv 2210.05204).
+verdicts are Kinboard's own. A. Elias and J. Wen (arXiv 2501.18505) report the GoFa as cuspidal, too; P. Wenger and
+D. Chablat (arXiv 2210.05204) review such arms.
 
 | verdict | how it is known | arms |
 |---|---|---|

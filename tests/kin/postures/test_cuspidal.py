@@ -94,7 +94,7 @@ def check_loop(robot: kin.Robot, found: kin.postures.Cuspidality, locked: tuple[
 
 
 @pytest.mark.parametrize("name", CUSPIDAL)
-def test_arms_known_to_be_cuspidal_have_a_loop_inside_their_limits(name):
+def test_cuspidal_arms_have_a_loop_inside_their_limits(name):
     robot = kin.get_robot(name)
     found = kin.cuspidal(robot)
     check_loop(robot, found)
