@@ -128,8 +128,8 @@ class LessonChoice:
 
     @property
     def opened(self) -> Hashable:
-        """As `Activity.opened`, with the step of the lesson."""
-        return self._stage.activity.opened, None if self.guide is None else self.guide.at
+        """As `Activity.opened`, with the step of the lesson and its answers."""
+        return self._stage.activity.opened, None if self.guide is None else self.guide.done
 
     @property
     def _title(self) -> str:

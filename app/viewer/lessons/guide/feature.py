@@ -156,9 +156,10 @@ class Guide(Feature):
         self._show()
 
     @property
-    def at(self) -> int:
-        """The index of the step on show."""
-        return self._progress.at
+    def done(self) -> Hashable:
+        """The step on show, and what has become of the questions."""
+        progress = self._progress
+        return progress.at, sum(progress.misses.values()), tuple(map(progress.mark, progress.questions))
 
     @property
     def _offered(self) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import numpy_arm
@@ -26,6 +27,8 @@ from app.viewer.lessons.guide.outline import Bar, Cosine, Drawn, Number, SemiAxi
 from app.viewer.scene.arm.arm_scene import THROUGH
 from app.viewer.scene.viewpoints import contains
 from app.viewer.server import ViewerServer
+from app.viewer.session import persistence
+from app.viewer.session.state import decode
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -275,6 +278,26 @@ def test_a_typed_length_is_drawn_and_the_right_one_only_when_it_is_on_show(serve
         tab.say("feature", ["guide", ["go", 3], 1])
         tab.wait(lambda: not nodes(tab) & {"wrong", "right"})
         tab.wait(lambda: not through(tab))
+
+
+def test_an_answer_is_stored_in_the_same_step(server: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reload brings it back, however soon it comes: not only once the page has rested."""
+    monkeypatch.setattr(persistence, "SAVE_AFTER", 1e6)
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", "Numeric IK")
+        tab.wait(lambda: "1. The error" in tab.html)
+
+        def stored() -> dict[str, Any]:
+            guide = decode(tab.kept[-1], STORE.robots).features.get("guide", {}) if tab.kept else {}
+            return {name: guide.get(name) for name in ("given", "misses", "revealed")}
+
+        for number, text in enumerate(("0.9 m", "0.8 m"), 1):
+            tab.say("feature", ["guide", ["fields", "1", number], [[text]]])
+            tab.wait(lambda number=number: stored()["misses"] == {"1": number})
+            assert stored()["given"].keys() == {"1"}
+        tab.say("feature", ["guide", ["reveal", "1", 3], None])
+        tab.wait(lambda: stored()["revealed"] == ["1"])
 
 
 def picture(tab: FakeBrowser) -> np.ndarray:
