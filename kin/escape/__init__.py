@@ -45,7 +45,6 @@ __all__ = ["Exit", "ExitCause", "Exits", "leave_singularity"]
 _ALIKE = 0.005  # deviations that differ by less of them are equal
 _OTHER = 2.0  # another posture is offered at up to so many times the deviation of the best
 _MOST = 4  # postures
-_CHECKED = 60  # ways that are checked for contacts
 _SHARES = np.linspace(0.0, 1.0, 33)  # of a motion, at which the tool is looked at
 _NEARLY = 1e-3  # deviation of an end beside which one may be found that keeps the tool
 
@@ -133,7 +132,7 @@ def _free(
         exits += [_described(measure, T, q, True) for q in waves]
     found: list[Exit] = []
     contact = None
-    for each in _ordered(exits)[:_CHECKED]:
+    for each in _ordered(exits):
         if len(found) == _MOST or (found and _is_worse(each, found[0])):
             break
         if any(_is_alike(measure, each, other) for other in found):

@@ -29,7 +29,8 @@ class ExitCause(NamedTuple):
     Attributes:
         code: ``"clear"``: the arm is beyond the margin already. ``"start outside"``, ``"start touches"``: it is
             outside its limits, or touches something. ``"margin"``: no configuration inside the limits that was
-            found is beyond the margin. ``"blocked"``: on the way to each of them something touches.
+            found is beyond the margin. ``"blocked"``: none of the ways to them is proven free
+            of contacts.
         violations: of ``"start outside"``.
         contact: of ``"start touches"`` and ``"blocked"``.
         largest: of ``"margin"``: the largest σ that was found; else NaN.
@@ -201,7 +202,7 @@ def _refusal(found: Exits, cause: ExitCause, units: Units) -> str:
         case "start touches":
             return f"Something touches where the arm is{contact}."
         case "blocked":
-            return f"On each way out that was found something touches{contact}."
+            return f"None of the ways out that were found is proven free of contacts{contact}."
         case "margin":
             largest = f"the largest σ_min found is {_value(cause.largest)}, the margin {_value(found.margin)}"
             return f"No way out was found inside the limits: {largest}."

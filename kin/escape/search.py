@@ -9,8 +9,9 @@ limits; of ends that deviate as little, the one nearest to where the arm is. Lev
 
     ‖e(q)‖² + ε ‖q − q₀‖² + μ Σ max(0, m − σₖ(q))²
 
-over the smallest three singular values with a weight μ that grows. ε is so small a share of ‖e‖² / ‖q − q₀‖² that
-it decides between ends of equal deviation only. The slope of a simple singular value is uᵀ ∂J v.
+over the smallest three singular values with a weight μ that grows. ε is a share of ‖e‖² / ‖q − q₀‖². Two shares
+are tried: the smaller one decides between ends of equal deviation only; the larger one finds shorter motions,
+because on a long one the tool may deviate more than at its end. The slope of a simple singular value is uᵀ ∂J v.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ class ExitCauseAnswer(Answer):
     code: ExitCode
     """"clear": the arm is beyond the margin already. "start outside", "start touches": it is outside its limits,
     or touches something. "margin": no configuration inside the limits that was found is beyond the margin.
-    "blocked": on each way out something touches."""
+    "blocked": none of the ways out that were found is proven free of contacts."""
     violations: list[Violation]
     """The joint values outside the limits."""
     contact: ContactAnswer | None

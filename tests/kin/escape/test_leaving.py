@@ -148,6 +148,36 @@ def test_a_way_out_touches_nothing():
     assert free.exits[0].deviation < found.exits[0].deviation < 0.2
 
 
+def test_a_caged_tool_has_no_way_out():
+    place, balls = kin.fk(UR5E, WRIST)[:3, 3], []
+    for side in np.vstack([np.eye(3), -np.eye(3)]):
+        middle = tuple((place + 0.3 * side).tolist())
+        tiny = surroundings(UR5E, (kin.Obstacle("sphere", middle, radius=1e-3),), links=False)
+        radius = float(tiny.distances(WRIST[None])[0][0]) - 1e-3  # 2 mm beside the arm
+        balls.append(kin.Obstacle("sphere", middle, radius=radius, name=f"ball {len(balls) + 1}"))
+    found = leave_singularity(UR5E, WRIST, obstacles=balls)
+    assert (found.found, found.cause.code) == (False, "blocked")
+    assert found.reason.startswith("None of the ways out that were found is proven free of contacts: link ")
+    assert found.cause.contact is not None
+
+
+def test_every_way_out_is_checked_before_it_is_said_that_none_is_free(monkeypatch):
+    """The last one, too, if it is the only free one."""
+    ends = []
+
+    def only(end):
+        def is_free(space, a, b):
+            ends.append(b)
+            return end is not None and np.array_equal(b, end)
+
+        monkeypatch.setattr("kin.way.free.Space.is_free", is_free)
+        return leave_singularity(UR5E, WRIST, avoid_self_collision=True)
+
+    assert only(None).cause.code == "blocked"
+    assert len(ends) > 60
+    assert np.array_equal(only(ends[-1]).exits[0].q[-1], ends[-1])
+
+
 @pytest.mark.parametrize(
     ("q", "keywords", "code", "words"),
     [
