@@ -11,9 +11,9 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import AvoidingBody
-from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
+from app.api.schemas import POST_REFUSALS, Configuration, Pendant, example, joint_values, reply, settings_of
 from app.api.work import Deadline, computed
-from app.shared.answers.way import ExitsAnswer
+from app.shared.answers.way import ExitsAnswer, exits_answer
 from kin import Robot, leave_singularity
 from kin.transforms import Array
 
@@ -30,6 +30,7 @@ class SingularityRequest(AvoidingBody):
     """Where the arm is, how far it should get, and what must not be touched."""
 
     q: Configuration = Field(description="Where the arm is, in radians (metres for sliding joints).")
+    pendant: Pendant = False
     margin: float | None = Field(
         None,
         gt=0.0,
@@ -54,10 +55,10 @@ async def singularity(request: Request, robot: Robot, body: SingularityRequest) 
 
     Otherwise the tool deviates as little as it can. Limits are kept; each motion is proven free of contacts.
     """
-    q = schemas.as_configurations(robot, body.q, settings_of(request))[0][0]
+    q = joint_values(robot, schemas.as_configurations(robot, body.q, settings_of(request))[0], body.pendant)[0]
     return await computed(request, partial(_leave, robot, q, body))
 
 
 def _leave(robot: Robot, q: Array, body: SingularityRequest, deadline: Deadline) -> Response:
     found = leave_singularity(robot, q, margin=body.margin, cancel=deadline.check, **body.keywords)
-    return reply(ExitsAnswer.of(found))
+    return reply(exits_answer(found, body.pendant))

@@ -19,7 +19,7 @@ from app.cli.terminal import (
 )
 from app.exports.program_toml import toml_of
 from app.exports.progress import progress_bar
-from app.shared.answers.way import ExitsAnswer, way_answer
+from app.shared.answers.way import exits_answer, way_answer
 from kin import InputError, leave_singularity
 from kin.files.numbers import index_of
 from kin.motion import JointTarget, Ptp
@@ -86,10 +86,12 @@ def run_out(arguments: Namespace) -> int:
         avoid_self_collision=arguments.avoid_self_collision,
     )
     if arguments.json:
-        print_json(ExitsAnswer.of(found))
+        print_json(exits_answer(found, arguments.pendant))
     else:
         print(found.explain(units))
     if found.exits and not arguments.json:
+        if arguments.pendant and robot.pendant_map is not None:
+            print("The sentences count joint values of the table; the rows below are as on the pendant.")
         notation = Notation(robot, arguments.rad)
         ends = [to_pendant(robot, each.q[-1]) if arguments.pendant else each.q[-1] for each in found.exits]
         rows = [

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
+from msgspec import UNSET, UnsetType
+
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import ContactAnswer, SingularityAnswer, Violation
 from app.shared.answers.fk import Matrix
 from app.shared.answers.motion import MotionAnswer, motion_answer
+from kin.escape import Exits
 from kin.escape.results import Code as ExitCode
 from kin.motion import Motion, program_to_dict
+from kin.motors import to_pendant
 from kin.way import Way
 from kin.way.results import Code
 
@@ -79,6 +83,8 @@ class ExitAnswer(Answer):
     """Name of the branch at the end; null if the arm's branches have no names."""
     length: float
     """Of the motion in joint space: radians, a slide counting as a share of the arm's reach."""
+    pendant: Matrix | UnsetType = UNSET
+    """With `pendant` in the request: the waypoints as the arm's pendant shows them."""
 
 
 class ExitCauseAnswer(Answer):
@@ -114,3 +120,12 @@ class ExitsAnswer(Answer):
     """Why there is none; null if there is one."""
     reason: str
     """All of it in sentences for people."""
+
+
+def exits_answer(found: Exits, pendant: bool) -> ExitsAnswer:
+    """The ways out of a singularity; `pendant`: also as the arm's pendant shows their waypoints."""
+    answer = ExitsAnswer.of(found)
+    if pendant:
+        for said, each in zip(answer.exits, found.exits, strict=True):
+            said.pendant = to_pendant(found.robot, each.q).tolist()
+    return answer

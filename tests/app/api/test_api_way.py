@@ -91,6 +91,17 @@ def test_the_ways_out_are_those_of_the_core(client):
     assert first["translation"] == pytest.approx(same.translation)
 
 
+def test_a_way_out_may_be_as_the_pendant_shows_it(client):
+    shown = [0.0, 0.5, 0.4, 0.0, 0.0, 0.0]
+    found = kin.leave_singularity("lrmate200id", kin.motors.from_pendant("lrmate200id", shown))
+    response = client.post("/api/v1/robots/lrmate200id/singularity", json={"q": shown, "pendant": True})
+    first = response.json()["exits"][0]
+    assert np.allclose(first["q"], found.exits[0].q)
+    assert np.allclose(first["pendant"], kin.motors.to_pendant("lrmate200id", found.exits[0].q))
+    assert np.allclose(first["pendant"][0], shown)
+    assert "pendant" not in leave(client, {"q": WRIST})["exits"][0]
+
+
 def test_a_tool_changes_what_has_to_stay(client):
     plain, long = (
         leave(client, {"q": WRIST, **more})

@@ -446,6 +446,26 @@ def test_the_ways_out_of_a_singularity_are_printed(capsys):
     assert "--margin" in err
 
 
+def test_the_ways_out_may_be_as_the_pendant_shows_them(capsys):
+    """FANUC counts J3 from the horizontal; the sentences are about the joint values of the table."""
+    shown = [0, 30, 20, 0, 0, 0]
+    words = ("singularity", "lrmate200id", *shown, "--pendant")
+    found = kin.leave_singularity("lrmate200id", kin.motors.from_pendant("lrmate200id", np.radians(shown)))
+    code, out, _ = run(capsys, *words)
+    assert code == 0
+    sentence, note = out.split("\n\n")[0].splitlines()
+    assert sentence == found.reason
+    assert note == "The sentences count joint values of the table; the rows below are as on the pendant."
+    ends = [kin.motors.to_pendant("lrmate200id", each.q) for each in found.exits]
+    row = out.split("\n\n")[1].splitlines()[-len(ends)]
+    assert [float(x) for x in re.findall(r"(-?[\d.]+)°", row)] == pytest.approx(np.degrees(ends[0][-1]), abs=1e-3)
+    for each, said, end in zip(found.exits, answer(capsys, *words)["exits"], ends, strict=True):
+        assert np.allclose(said["q"], each.q)
+        assert np.allclose(said["pendant"], end)
+    plain = ("singularity", "ur5e", 20, -70, 80, -40, 0, 10)  # its pendant shows the table's values
+    assert run(capsys, *plain, "--pendant") == run(capsys, *plain)
+
+
 def test_each_row_of_the_commands_is_named_as_the_command():
     assert [name for name in parser.subcommands() if " " not in name] == [each.name for each in parser.COMMANDS]
 
