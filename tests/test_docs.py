@@ -133,7 +133,9 @@ def test_rest_examples_are_answered():
             answer = client.get(f"{url.path}?{url.query}")
         assert answer.status_code == 200, answer.text
         answers[url.path.rsplit("/", 1)[1]] = answer
-    assert set(answers) == {"fk", "ik", "motion", "workspace", "summary", "reachable", "capability"}
+    examples = {"fk", "ik", "motion", "workspace", "summary", "reachable", "capability", "touch-postures"}
+    assert set(answers) == examples
+    assert len(answers["touch-postures"].json()["q"]) == 12
     assert answers["ik"].json()["status"] == "solved"
     assert [one["reachable"] for one in answers["reachable"].json()["results"]] == [True, False]
     assert answers["workspace"].text.startswith("x,y,z,manipulability,q1,")
