@@ -22,7 +22,7 @@ from app.viewer.declared.work import Work
 from app.viewer.views.templates import render
 from kin import InputError
 from kin.postures import PostureMap
-from kin.units import Units
+from kin.units import Units, typeset
 
 Plane = Literal["vertical", "horizontal", "joints"]
 PLANES: dict[str, Plane] = {
@@ -137,4 +137,4 @@ def _note(text: str) -> str:
 
 def _plot(found: PostureMap, units: Units) -> str:
     """The map as a picture, and its regions in words below it."""
-    return Markup(drawing(found, SIDE, fluid=True)) + Markup(_note(found.explain(units)))
+    return Markup(drawing(found, SIDE, fluid=True)) + Markup(_note(typeset(found.explain(units))))
