@@ -303,9 +303,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         self._take(None)
 
     def on_to(self, at: int) -> None:
-        """Show another posture; what is typed for this one is taken before. Raises `InputError`."""
-        if self.settings.joints.strip() and self.settings.joints != self._written(self._run):
-            self.on_take()
+        """Show another posture; what is typed and not taken is given up: letters of it may be on their way."""
         self._show(at)
 
     def on_report(self) -> None:
