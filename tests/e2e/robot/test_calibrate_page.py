@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from page import Tab
-from playwright.sync_api import expect
+from playwright.sync_api import Locator, expect
 
 import kin
 from kin.calibration.chain import Chain
@@ -46,6 +46,13 @@ def take(tab: Tab, at: int, q: np.ndarray) -> None:
     expect(cells.last).to_have_text(Units().angles.text(q[-1], 2))
 
 
+def has_arrived(shown: Locator, q: np.ndarray) -> None:
+    """Wait until the page shows these values of the connected arm."""
+    table = shown.locator("xpath=following-sibling::table[1]")
+    for value in q:
+        expect(table).to_contain_text(DEFAULT_UNITS.angles.text(float(value)))
+
+
 @pytest.mark.parametrize("size", ["desktop", "phone"])
 def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.FixtureRequest, size: str) -> None:
     tab: Tab = request.getfixturevalue(size)
@@ -71,9 +78,7 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
             shown = page.locator(f'[data-calibrate-posture="{i + 1}"]')
             expect(shown).to_be_visible()
             arm.measured = q
-            expect(shown.locator("xpath=following-sibling::table[1]")).to_contain_text(
-                DEFAULT_UNITS.angles.text(float(q[0]))
-            )
+            has_arrived(shown, q)
             if i in (1, 9):
                 shown.evaluate("block => block.scrollIntoView()")  # at once: its numbers are written anew
                 tab.screenshot(f"calibrate-{size}-posture-{i + 1}")
