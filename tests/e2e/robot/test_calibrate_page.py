@@ -46,6 +46,15 @@ def take(tab: Tab, at: int, q: np.ndarray) -> None:
     expect(cells.last).to_have_text(Units().angles.text(q[-1], 2))
 
 
+def program(tab: Tab) -> tuple[str, ...]:
+    """The address and the code with which a program connects to the page."""
+    tab.open("Program")
+    tab.page.get_by_role("button", name="Connect a program").click()
+    said = PROGRAM.search(tab.page.locator(".kb-live").inner_text())
+    assert said is not None
+    return said.groups()
+
+
 def has_arrived(shown: Locator, q: np.ndarray) -> None:
     """Wait until the page shows these values of the connected arm."""
     table = shown.locator("xpath=following-sibling::table[1]")
@@ -58,10 +67,7 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
     tab: Tab = request.getfixturevalue(size)
     page, dark = tab.page, size == "phone"
     tab.set_dark(dark)
-    tab.open("Program")
-    page.get_by_role("button", name="Connect a program").click()
-    said = PROGRAM.search(page.locator(".kb-live").inner_text())
-    assert said is not None
+    address_and_code = program(tab)
     tab.open("Robot")
     page.locator('[data-cell="start"]').select_option("so101")
     expect(page.locator('[data-cell="0 name"]')).to_have_value("shoulder pan")
@@ -73,7 +79,7 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
     tab.screenshot(f"calibrate-{size}-begin")
     propose.click()
     table = page.get_by_role("table", name="Touches")
-    with kin.connect(*said.groups(), name="arm.py") as arm:
+    with kin.connect(*address_and_code, name="arm.py") as arm:
         for i, q in enumerate(simulated()):
             shown = page.locator(f'[data-calibrate-posture="{i + 1}"]')
             expect(shown).to_be_visible()
