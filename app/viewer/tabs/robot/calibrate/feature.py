@@ -177,7 +177,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             made: Run = result.value
             if run is None:
                 self.change(wanted=0, run=made)
-                self._show(made.at)
+                self.on_to(made.at)
                 self.stage.fit_view((), made.spots)
             else:  # something may be being typed for the posture on show
                 self.change(wanted=0, run=replace(made, at=run.at, course=run.course))
@@ -303,8 +303,15 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         self._take(None)
 
     def on_to(self, at: int) -> None:
-        """Show another posture; what is typed and not taken is given up: letters of it may be on their way."""
-        self._show(at)
+        """Show a posture, and what was read in it.
+
+        What is typed and not taken is given up: letters of it may be on their way.
+        """
+        run = self._run.to(at)
+        scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
+        read = zip(run.read[run.at] or (), scales, strict=False)
+        self.change(run=run, joints=" ".join(f"{value * scale:.8g}" for value, scale in read))
+        self.rewrite()
 
     def on_report(self) -> None:
         """Save what was found as one page."""
@@ -330,26 +337,14 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         self.change(run=None, joints="", wanted=0)
         self.stage.fit_view(())
 
-    def _show(self, at: int) -> None:
-        """Show a posture, and what was read in it."""
-        run = self._run.to(at)
-        self.change(run=run, joints=self._written(run))
-        self.rewrite()
-
-    def _written(self, run: Run) -> str:
-        """What was read in the posture on show, as it is typed."""
-        scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
-        read = zip(run.read[run.at] or (), scales, strict=False)
-        return " ".join(f"{value * scale:.8g}" for value, scale in read)
-
     def _take(self, q: tuple[float, ...] | None) -> None:
         """Take what was read in the posture on show; None: nothing."""
         self.change(run=self._run.with_read(q))
-        self._show(self._run.at)
+        self.on_to(self._run.at)
 
     def on_style(self) -> None:
         if (run := self.settings.run) is not None and run.read[run.at] is not None:
-            self._show(run.at)  # in other units
+            self.on_to(run.at)  # in other units
         super().on_style()
 
     # Links
