@@ -11,14 +11,12 @@ from pydantic import Field
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import Target, takes
-from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, Body, Configuration, OneOf, Vector3, example, refusals, reply
 from app.api.work import Deadline, computed
 from app.api.workspace.query import RegionQuery
 from app.exports.postures import FORMATS
 from app.shared.answers.postures import CuspidalAnswer, PostureMapAnswer, cuspidal_answer, posture_map_answer
-from app.shared.problems import from_input_error
-from kin import InputError, JointConstraints, Robot, cuspidal, posture_map
+from kin import JointConstraints, Robot, cuspidal, posture_map
 from kin.postures.verdicts import MOST_SEED, POSES
 
 router = versioned("kinematics")
@@ -59,10 +57,7 @@ async def is_cuspidal(request: Request, robot: Robot, query: CuspidalQuery) -> R
 
 
 def _cuspidal(robot: Robot, constraints: JointConstraints, poses: int, seed: int, deadline: Deadline) -> Response:
-    try:
-        found = cuspidal(robot, constraints=constraints, poses=poses, seed=seed, cancel=deadline.check)
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
+    found = cuspidal(robot, constraints=constraints, poses=poses, seed=seed, cancel=deadline.check)
     return reply(cuspidal_answer(found))
 
 
@@ -133,11 +128,8 @@ async def postures(request: Request, robot: Robot, body: PostureMapRequest) -> R
 
 
 def _map(robot: Robot, body: PostureMapRequest, deadline: Deadline) -> Response:
-    try:
-        pose = None if body.target is None else body.target.in_world("pose", "target", robot.maker)[1]
-        found = posture_map(robot, pose, cancel=deadline.check, **body.keywords)
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
+    pose = None if body.target is None else body.target.in_world("pose", "target", robot.maker)[1]
+    found = posture_map(robot, pose, cancel=deadline.check, **body.keywords)
     if body.format == "json":
         return reply(posture_map_answer(found))
     kind = FORMATS[body.format]
