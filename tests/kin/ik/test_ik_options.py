@@ -763,7 +763,7 @@ def test_a_multiple_root_is_said(name, q, multiple, said):
 @pytest.mark.parametrize(
     ("name", "options", "said"),
     [
-        ("puma560", {"task": "position"}, "Reached: infinitely many configurations for this point; 3 were found."),
+        ("puma560", {"task": "position"}, "Reached: infinitely many configurations for this point;"),
         ("ur5", {"mask": [True] * 4 + [False, True]}, "Reached: infinitely many configurations for this set of"),
         (
             "pioneer5",

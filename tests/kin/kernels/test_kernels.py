@@ -38,8 +38,8 @@ def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path
 
     assert run() == "2 0 False True"
     assert run() == "2 1 True True", "kept"
-    common = package / "solvers" / "common.py"
-    common.write_text(common.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    angles = package / "angles.py"
+    angles.write_text(angles.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     assert run() == "2 0 False True", "compiled anew"
     for file in (tmp_path / "cache").rglob("*.nbc"):
         data = file.read_bytes()

@@ -644,7 +644,12 @@ def test_estimates_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
         return
     assert isinstance(first.step.estimate, Choice)
     rights = [i for i, option in enumerate(first.step.estimate.options) if option.right]
-    assert rights == [ESTIMATES[lesson.key](first)]
+    assert ESTIMATES[lesson.key](first) in rights
+    if lesson.key == "dh":  # near the diagonal one does not see which is more
+        side, up = from_base(first)
+        assert len(rights) == 1 + (0.8 < abs(up) / side < 1.25)
+    else:
+        assert len(rights) == 1
 
 
 @pytest.mark.parametrize("robot", ARMS)

@@ -108,7 +108,7 @@ def parts_of(one: Exercise, variant: Variant) -> list[list[tuple[float, float]]]
     kind, scales, near = one.kind, ANGLES, 1e-3
     if isinstance(kind, NumberKind):
         unit = kind._shown_unit(UNITS)
-        nears = [question.tolerance * unit.scale for question in kind._questions(variant, UNITS)]
+        nears = [question.tolerance * unit.scale for question in kind.questions(variant, UNITS)]
         scales = ANGLES if unit == UNITS.angles else LENGTHS if unit == UNITS.lengths else (1.0,)
         return [
             [(value * scale, near * scale) for scale in scales] for value, near in zip(flat, nears, strict=True)

@@ -211,7 +211,10 @@ def described(state: PageState) -> dict[str, Any]:
     return found
 
 
-LATER = {"rotations": {"axes": "all"}}  # settings that links did not have when these were recorded
+LATER = {
+    "rotations": {"axes": "all"},
+    "workspace": {"postures": {"plane": "vertical", "limits": True}},
+}  # settings that links did not have when these were recorded
 RECORDED: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
 
 

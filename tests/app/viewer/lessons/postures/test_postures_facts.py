@@ -56,7 +56,7 @@ def test_postures_reach_the_target_as_their_words_say(robot: kin.Robot) -> None:
                 assert room.min() < 0.0
                 continue
             assert room.min() > -1e-9
-            weighed = room * np.where(robot.revolute, 1.0, 4.0)
+            weighed = room * np.where(robot.revolute, 1.0, 1.0 / robot.reach)
             nearest = int(np.argmin(weighed))
             if math.isfinite(room[nearest]):
                 assert posture.margin == pytest.approx(max(room[nearest], 0.0))

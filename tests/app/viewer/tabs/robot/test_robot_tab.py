@@ -525,8 +525,8 @@ def test_reset_goes_back_to_the_file_that_the_arm_came_from(port: int) -> None:
         tab.settle()
         for robot in (UR5, PIONEER):
             tab.open_file("robot", "arm.toml", kin.robot_to_toml(robot))
-            assert '<option value="" selected>your own file</option>' in part(tab, "start")
             shows(tab, robot, robot.q_home)
+            tab.wait(lambda: '<option value="" selected>your own file</option>' in part(tab, "start"))
             if robot is UR5:
                 type_in(tab, 0, "d", "95")
                 tab.settle()
