@@ -24,6 +24,7 @@ from kin.transforms import Array, finite_array
 _FINE = (math.radians(0.005), 0.1e-3)  # of an industrial arm: a reading, a contact in a socket
 _HOBBY_PLAY, _HOBBY_CONTACT = math.radians(0.3), 0.3e-3  # of an arm of hobby servos
 _PRINTED = 0.005
+_LEAST = 1e-6  # radians and metres: finer than any encoder or socket, and squares of it are still told from 0
 _MOST = {
     "zero": math.radians(30.0),
     "length": 0.1,
@@ -49,7 +50,7 @@ class TableTolerances:
             closed form then, and more of its errors.
 
     Raises:
-        InputError: a tolerance that is negative or too large, or a zero, length, twist or tip that is 0.
+        InputError: a tolerance below a millionth or too large; scale and wave may be 0.
     """
 
     zero: float = math.radians(2.0)
@@ -64,8 +65,9 @@ class TableTolerances:
         """Check the fields."""
         for key, most in _MOST.items():
             value = finite_number(key, getattr(self, key))
-            if not 0.0 <= value <= most or (value == 0.0 and key not in ("scale", "wave")):
-                raise InputError(key, value, f"a positive number of at most {most:.4g}")
+            none = key in ("scale", "wave")
+            if not _LEAST <= value <= most and not (none and value == 0.0):
+                raise InputError(key, value, f"{'0 or ' if none else ''}{_LEAST} to {most:.4g}")
 
     @classmethod
     def of(cls, robot: Robot) -> TableTolerances:
@@ -94,7 +96,7 @@ class TouchNoise:
         contact: of a contact in a socket, in each direction, metres.
 
     Raises:
-        InputError: a number that is not positive.
+        InputError: a number below a millionth, finer than any encoder or socket, or one that is too large.
     """
 
     joint: ArrayLike = _FINE[0]
@@ -103,10 +105,10 @@ class TouchNoise:
     def __post_init__(self) -> None:
         """Check the fields."""
         joint = np.asarray(self.joint, dtype=np.float64)
-        if not (np.isfinite(joint).all() and (joint > 0.0).all() and (joint < 0.5).all()):
-            raise InputError("joint", self.joint, "positive numbers below 0.5 (radians or metres)")
-        if not 0.0 < finite_number("contact", self.contact) <= 0.1:
-            raise InputError("contact", self.contact, "a positive number of at most 0.1 m")
+        if not (np.isfinite(joint).all() and (joint >= _LEAST).all() and (joint < 0.5).all()):
+            raise InputError("joint", self.joint, f"at least {_LEAST}, below 0.5 (radians or metres)")
+        if not _LEAST <= finite_number("contact", self.contact) <= 0.1:
+            raise InputError("contact", self.contact, f"{_LEAST} to 0.1 m")
 
     @classmethod
     def of(cls, robot: Robot) -> TouchNoise:

@@ -101,10 +101,10 @@ class FixtureBody(schemas.Body):
 class TolerancesBody(schemas.Body):
     """Largest errors that are expected; the fit takes them to be up to three times as large."""
 
-    zero: float | None = Field(None, gt=0.0, strict=True, description="Of a joint's zero, in radians.")
-    length: float | None = Field(None, gt=0.0, strict=True, description="Of a length d or a, in metres.")
-    twist: float | None = Field(None, gt=0.0, strict=True, description="Of a twist and a tilt, in radians.")
-    tip: float | None = Field(None, gt=0.0, strict=True, description="Of the tool point, in metres.")
+    zero: float | None = Field(None, ge=1e-6, strict=True, description="Of a joint's zero, in radians.")
+    length: float | None = Field(None, ge=1e-6, strict=True, description="Of a length d or a, in metres.")
+    twist: float | None = Field(None, ge=1e-6, strict=True, description="Of a twist and a tilt, in radians.")
+    tip: float | None = Field(None, ge=1e-6, strict=True, description="Of the tool point, in metres.")
     scale: float | None = Field(None, ge=0.0, strict=True, description="Share by which all lengths may be off.")
     wave: float | None = Field(None, ge=0.0, strict=True, description="Of an encoder in each turn, in radians.")
     keep_family: bool | None = Field(None, strict=True, description="Whether what is 0 stays 0, and all twists.")
@@ -113,8 +113,8 @@ class TolerancesBody(schemas.Body):
 class NoiseBody(schemas.Body):
     """What a reading and a contact are off by at random, as standard deviations."""
 
-    joint: float = Field(gt=0.0, lt=0.5, strict=True, description="Of a reading, in radians (metres).")
-    contact: float = Field(gt=0.0, le=0.1, strict=True, description="Of a contact in each direction, in metres.")
+    joint: float = Field(ge=1e-6, lt=0.5, strict=True, description="Of a reading, in radians (metres).")
+    contact: float = Field(ge=1e-6, le=0.1, strict=True, description="Of a contact in each direction, in metres.")
 
 
 class TouchBody(schemas.Body):

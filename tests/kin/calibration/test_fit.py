@@ -11,7 +11,7 @@ from kin.calibration.chain import Chain
 from kin.calibration.faults import checked
 from kin.calibration.fit import Touches, fit
 from kin.calibration.fixtures import PLANE, Places, TouchBoard, TouchFixture
-from kin.calibration.model import Model, TableTolerances
+from kin.calibration.model import Model, TableTolerances, TouchNoise
 from kin.calibration.postures import Scene, candidates
 from tests.kin.calibration.simulated import (
     DEG,
@@ -391,3 +391,19 @@ def test_fixtures_and_tolerances_are_checked(make, field):
     with pytest.raises(kin.InputError) as caught:
         make()
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("make", "field", "valid"),
+    [
+        (lambda: TouchNoise(joint=5e-324), "joint", "at least 1e-06"),
+        (lambda: TouchNoise(contact=1e-200), "contact", "1e-06 to 0.1 m"),
+        (lambda: TableTolerances(zero=1e-300), "zero", "1e-06 to"),
+        (lambda: TableTolerances(scale=1e-300), "scale", "0 or 1e-06 to"),
+    ],
+)
+def test_sizes_whose_squares_are_lost_in_rounding_are_refused(make, field, valid):
+    with pytest.raises(kin.InputError) as caught:
+        make()
+    assert caught.value.field == field
+    assert valid in str(caught.value)
