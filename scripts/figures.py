@@ -54,7 +54,10 @@ FIGURES = {
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages of all arms to the site."""
+    """Add the pages of all arms to the site, and leave out what only the theme's authors, or other languages, need."""
+    for file in list(files):
+        if file.src_uri.startswith("assets/") and (file.src_uri.endswith(".map") or "/lunr/" in file.src_uri):
+            files.remove(file)
     for name, text in shared_files().items():
         files.append(File.generated(config, f"figures/{name}", content=text))
     for robot in kin.builtin_robots().values():
