@@ -613,9 +613,6 @@ class FakeBrowser:
                 self.nodes = {
                     n: v for n, v in self.nodes.items() if n != m["name"] and not n.startswith(m["name"] + "/")
                 }
-            case "SceneNodeUpdateMessage":
-                if m["name"] in self.nodes:
-                    self.nodes[m["name"]]["props"].update(m["updates"])
             case "GuiUpdateMessage":
                 if m["uuid"] in self.gui:
                     for key, value in m["updates"].items():
@@ -625,6 +622,8 @@ class FakeBrowser:
                             self.gui[m["uuid"]]["props"][key] = value
             case "GuiRemoveMessage":
                 self.gui.pop(m["uuid"], None)
+                # What the channel says of it later is for nothing, as in static/parts.js.
+                self._parts = {key: uuid for key, uuid in self._parts.items() if uuid != m["uuid"]}
             case kind if kind.startswith("Gui") and "props" in m and "uuid" in m:
                 self.gui[m["uuid"]] = m
                 content = m["props"].get("content", "")
