@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Hashable
 from typing import Any
 
@@ -12,7 +11,6 @@ from app.viewer.room.member import NEWS, Member
 from app.viewer.room.member_page import MemberPage
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
-from app.viewer.session.persistence import SAVE_AFTER
 
 
 class ClassroomPage(MemberPage):
@@ -51,13 +49,6 @@ class ClassroomPage(MemberPage):
             super()._act(key, value)
         elif key == "live":
             self.live.refuse(self._member.refusal("live"))
-
-    def _step(self, batch: list[tuple[Hashable, object]]) -> None:
-        due = self._persistence.due
-        super()._step(batch)
-        if batch and all(key == ("news", Member.key, NEWS) for key, _ in batch):
-            # News come all the time: they must not put off the saving of what the visitor does.
-            self._persistence.due = time.perf_counter() + SAVE_AFTER if due is None else due
 
     def _leave(self) -> None:
         try:

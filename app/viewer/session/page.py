@@ -45,7 +45,7 @@ from app.viewer.session.channel.channel import Channel
 from app.viewer.session.channel.files import Files
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
-from app.viewer.session.events import FENCE
+from app.viewer.session.events import FENCE, name_of
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.live import LiveInput
@@ -400,9 +400,13 @@ class VisitorPage(ShownArm, Worker):
             self.numbers.update()
         if not (self.arm.moving or self.arm.dragging or self.arm.playing):
             self.fence.ask()
-        if any(key != FENCE for key, _ in batch) or (played and not self.arm.playing):
-            self._persistence.postpone(now)
+        names = {name_of(key) for key, _ in batch} - {FENCE}
+        acted = names - {"news"} or (played and not self.arm.playing)
+        if acted or (names and self._persistence.due is None):  # news may never pause
+            if self._persistence.postpone(now) and not self.arm.dragging:
+                self._save()
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
+            self.camera.lead_back()
             self._save()
             self._show_hints()
             self.arm.show_gizmo_again()

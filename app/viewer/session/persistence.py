@@ -2,8 +2,8 @@
 
 The state is stored in the browser: in the page's URL and in the storage of its tab. The service keeps nothing of a
 visitor who leaves. When a page connects, for the first time or after a lost connection, the service reads the
-stored state; from then on it stores the state at each pause of the visitor. Whatever is opened is stored at once.
-What is stored is a `PageState`.
+stored state; from then on it stores the state at each pause of the visitor, or after a second without one.
+Whatever is opened is stored at once. What is stored is a `PageState`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from app.viewer.shown import SHOWN
 
 log = logging.getLogger(__name__)
 
-SAVE_AFTER = 0.5  # seconds of rest before the state is saved
+SAVE_AFTER = 0.5  # seconds of rest before the state is saved; without a rest, at most twice that
 ANSWER_WITHIN = 10.0  # seconds for the page to send its stored state; it may still be starting
 
 
@@ -76,6 +76,7 @@ class Persistence:
         self._opened: Hashable = None  # of the saved state, as `LessonChoice.opened`
         self._share: SharePanel
         self.due: float | None = None
+        self._since: float | None = None  # when the first act was that is not saved
         self.led = False
 
     @property
@@ -142,9 +143,12 @@ class Persistence:
         self._update_share()
         return self._saved
 
-    def postpone(self, now: float) -> None:
-        """The visitor did something: wait for the next rest."""
+    def postpone(self, now: float) -> bool:
+        """The visitor did something: wait for the next rest. Returns whether to `save` before it."""
         self.due = now + SAVE_AFTER
+        if self._since is None:
+            self._since = now
+        return now - self._since >= SAVE_AFTER
 
     @property
     def urgent(self) -> bool:
@@ -164,8 +168,8 @@ class Persistence:
         Args:
             key: where to, as `History.take_key`; another viewpoint alone always replaces the present entry.
         """
+        self._since = None
         self._page.camera.look()
-        self._page.camera.lead_back()
         state = self.snapshot()
         text, self._opened = self._written(state), self._page.lessons.opened
         if text != self._saved:

@@ -8,6 +8,7 @@ import json
 import math
 import random
 import re
+import time
 import tracemalloc
 import zlib
 from collections.abc import Iterator
@@ -501,6 +502,22 @@ def test_the_state_is_stored_after_a_drag_and_not_during_it(port):
         state = kept(tab)
         assert len(tab.kept) == 1
         assert np.abs(kin.fk(PIONEER, state.q)[:3, 3] - T[:3, 3]).max() < 1e-6
+
+
+def test_acts_without_a_rest_are_stored_within_a_second(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [time.perf_counter()]
+    monkeypatch.setattr(page, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        acts: dict[int, float] = {}  # when each was
+        for count in range(1, TALKS):
+            now[0] += 0.3
+            acts[count] = now[0]
+            tab.set("Count", count)
+            tab.settle(quiet=0.05)
+            stored = decode(tab.kept[-1], ROBOTS).features["counter"]["count"] if tab.kept else 0
+            assert all(now[0] - at < 1.0 for count, at in acts.items() if count > stored)
+        assert len(tab.kept) <= len(acts) / 2, "not each act alone"
 
 
 UNREADABLE, PARTLY = (
