@@ -83,23 +83,30 @@ const viserPage = (() => {
   });
 
   // viser sends one change of the controls of a tab in 50 ms, the newest. So of buttons that are pressed within one moment,
-  // as in a busy page, some would be lost: here they take turns. The next turn is counted from when the last one was, as
-  // timers that a busy page is late for all end at once.
+  // as in a busy page, some would be lost, and letters typed right before a press: here presses take turns, and wait for
+  // letters. The next turn is counted from when the last one was, as timers that a busy page is late for all end at once.
   const HELD_BACK = 60; // ms
   const turns = []; // what waits for its turn
   let holding = false; // viser may hold back what the last turn was for
   let inTurn = false;
+  let typedAt = -HELD_BACK; // the last letter
+  const hasJustTyped = () => performance.now() - typedAt < HELD_BACK;
+  addEventListener("input", () => { typedAt = performance.now(); }, true);
   function hold() {
     holding = true;
     setTimeout(() => {
       holding = turns.length > 0;
-      if (holding) { turns.shift()(); hold(); }
+      if (!holding) return;
+      if (!hasJustTyped()) turns.shift()();
+      hold();
     }, HELD_BACK);
   }
   addEventListener("click", (event) => {
     const button = closest(event.target, PARTS.button);
     if (!button || inTurn) return;
-    if (!holding) return hold();
+    const waits = holding || hasJustTyped();
+    if (!holding) hold();
+    if (!waits) return;
     event.stopImmediatePropagation();
     turns.push(() => {
       inTurn = true;

@@ -77,7 +77,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._scene = SceneView(stage.client.scene, self.key, self.post)
         self._runner = Runner(lambda: (within or self).post(("done", ())))
         self.shown_at = 0.0
-        self._write = self._stale = False
+        self._write = self._stale = self._pressed = False
         self._withheld = stage.activity.withheld
         self._reads = ArmReads(stage.now)
         self.facts: F = self._facts()
@@ -160,7 +160,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def refresh(self) -> None:
         """Show what is declared now."""
-        self.shown_at, self.due, self._stale = time.perf_counter(), None, False
+        self.shown_at, self.due, self._stale, self._pressed = time.perf_counter(), None, False, False
         if self._withheld != self.stage.activity.withheld:
             self._withheld = self.stage.activity.withheld
             self._scene.remove()  # hidden nodes too: the browser has their data
@@ -238,12 +238,16 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.invalidate()
         self.schedule()  # shown once, after all events that wait, and after errors
         match key:
-            case ("at", str(path), int(serial)):
+            case ("at", str(path), int(serial), int()):
+                if self._pressed:  # a control that the press has replaced sends nothing more
+                    self.refresh()
+                    self.schedule()
                 if (found := self._panel.received(self.settings, path, serial, value)) is not None:
                     self.settings = found
                     self.changed(path)
             case ("do", (str(name), *arguments), int(serial), int()):
                 if self._panel.is_live(serial):
+                    self._pressed = True
                     getattr(self, name)(*arguments)
             case ("done", ()):
                 self._go_on(time.perf_counter())
@@ -255,7 +259,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def step_name(self, key: Hashable) -> str:
         match key:
-            case ("at", str(path), int()):
+            case ("at", str(path), *_):
                 return self.settings_of.spec(path).undo or self.title
             case ("do" | "drag", (str(name), *_), *_):
                 return self.undo.get(name, self.title)

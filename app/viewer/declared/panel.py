@@ -144,7 +144,8 @@ class _Mounted:
 class PanelView:
     """The controls of one feature, in the container that is open when this is made, or in `top` itself.
 
-    Events are posted as ``("at", path, serial)`` with a value, and ``("do", event, serial, press)``.
+    Events are posted as ``("at", path, serial, press)`` with a value, and ``("do", event, serial, press)``. There,
+    press is the number of the press, or of the last one: in the inbox, no value replaces one of before a press.
     """
 
     def __init__(
@@ -156,6 +157,7 @@ class PanelView:
         self._mounted: dict[Hashable, _Mounted] = {}
         self._live: dict[int, _Mounted] = {}
         self._serials = count(1)
+        self._presses = 0
 
     def show(
         self, nodes: Sequence[Node], settings: Settings, robot: Robot, units: Units, write: bool = False
@@ -344,30 +346,33 @@ class PanelView:
     def _listen(self, handle: Any, path: str, serial: int) -> None:
         async def changed(event: Any) -> None:
             if event.client is not None:
-                self._post(("at", path, serial), sent_value(event))
+                self._post(("at", path, serial, self._presses), sent_value(event))
 
         handle.on_update(changed)
 
-    def _listen_group(self, handle: Any, one: _Mounted) -> None:
-        presses = count()
+    def _press(self, event: Event, serial: int) -> None:
+        """Each press has a number, so that no tap is lost."""
+        self._presses += 1
+        self._post(("do", event, serial, self._presses), None)
 
+    def _listen_group(self, handle: Any, one: _Mounted) -> None:
         async def clicked(event: Any) -> None:
             if event.client is not None and (found := one.events.get(event.target.value)) is not None:
-                self._post(("do", found, one.serial, next(presses)), None)
+                self._press(found, one.serial)
 
         handle.on_click(clicked)
 
     def _listen_button(self, handle: Any, one: _Mounted, hold: float) -> None:
         press = Press()
 
-        # Each press has a number, so that no tap is lost; a slow worker skips repeats of one press.
+        # A slow worker skips repeats of one press.
         async def held(found: Any) -> None:
             if found.client is not None and press.held(time.monotonic()):
-                self._post(("do", one.events[""], one.serial, press.number), None)
+                self._post(("do", one.events[""], one.serial, -press.number), None)
 
         async def clicked(found: Any) -> None:
             if found.client is not None and (not hold or press.clicked(time.monotonic())):
-                self._post(("do", one.events[""], one.serial, press.number), None)
+                self._press(one.events[""], one.serial)
 
         if hold:
             handle.on_hold(held, callback_hz=hold)

@@ -85,9 +85,9 @@ class Forms:
 
     def _forward(self, place: str, key: Hashable, value: object) -> None:
         match key:
-            case ("at", "task", int(serial)):
+            case ("at", "task", int(serial), int()):
                 self._post(("task", place, "task", serial), value)
-            case ("at", str(path), int(serial)):
+            case ("at", str(path), int(serial), int()):
                 self._post(("view", place, path, serial), value)
             case ("do", tuple(event), *_):
                 self._post(event, None)

@@ -579,8 +579,8 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
         # Late events of replaced sliders.
         (gone, also) = before - set(shown._panel._live)
         for path, value in (("at", 0.0), ("size", 20.0)):
-            shown.post(("at", path, gone), value)
-            shown.post(("at", path, also), value)
+            shown.post(("at", path, gone, 0), value)
+            shown.post(("at", path, also, 0), value)
         tab.settle()
         assert tab.value("Cut at (cm)") == pytest.approx(20.0)
         assert tab.value("Point size (cm)") == pytest.approx(size / 10)
