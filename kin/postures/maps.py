@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kin.axes import generic_q
+from kin.axes import generic_q, inverse, links_of
 from kin.differential.metric import extent
 from kin.differential.task import Task, natural_task, task_rows, usual_rank
 from kin.errors import InputError
@@ -52,6 +52,7 @@ MOST = 1000  # nodes along a side
 _AT_ONCE = 512  # poses
 _THREADS = 2
 _BISECTIONS = 2
+_SLACK = 1e-6  # m
 _MET = 1e-7  # m and entries of rotations: rows of the kernels that are farther off are no solutions
 # Orientations such as straight down are special: a general solver takes ten times as long there, and misses some.
 # So it counts in an orientation that is turned by this.
@@ -356,12 +357,29 @@ class _Solver:
     def _rows(self, form: ClosedForm, T: Array, careful: bool) -> Array:
         if not form.named:
             T = T @ _TURNED
-        rows = np.empty((len(T), len(form.branches), self.arm.n))
+        out = np.full((len(T), len(form.branches), self.arm.n), math.nan)
+        near = np.flatnonzero(self._within_reach(T))
+        T = T[near]
+        rows = np.empty((len(T), *out.shape[1:]))
         form.kernels.many(form.kernels.params, T, np.array([math.nan]), self.arm.q_home.copy(), rows)
         for each, q in zip(T, rows, strict=True) if careful else ():
             form.add_missing(each, self.arm.q_home.copy(), q)
         rows[~self._met(rows, T)] = math.nan
-        return rows
+        out[near] = rows
+        return out
+
+    def _within_reach(self, T: Array) -> Flags:
+        """Which poses ``(k, 4, 4)`` leave the links between the first and the last axis long enough.
+
+        The common normal of two axes, and the way along the second one to the next normal, belong to one link and
+        are perpendicular. So the last axis passes the first one no farther away than the sum of these diagonals.
+        """
+        if self.task != "pose" or self.arm.coupled or not self.arm.revolute.all():
+            return np.ones(len(T), dtype=np.bool_)
+        links = links_of(self.arm, (1,) * (self.arm.n - 1))
+        last = T[:, :3, :3] @ inverse(links.tool)[:3, 3] + T[:, :3, 3]
+        reach = float(np.hypot(links.a[:-1], links.d[1:]).sum())
+        return np.asarray(np.linalg.norm(last - links.base[:3, 3], axis=1) < reach + _SLACK)
 
     def _met(self, rows: Array, T: Array) -> Flags:
         """Which configurations ``(…, m, n)`` meet their poses ``(…, 4, 4)``."""
@@ -451,10 +469,12 @@ def _map(solver: _Solver, plane: MapPlane, nodes: int, progress: Callable[[float
     again = solver.lonely(every.reshape(nodes, nodes))
     every[again], inside[again] = solver.counts(plane.poses(robot, xy[again]), careful=True)
     counts: Counts = (inside if solver.respect_limits else every).reshape(nodes, nodes)
-    parts: Counts = counts if plane.joints is None else levels(xy)[:, 0].reshape(nodes, nodes)
+    marks = np.stack([counts, every.reshape(nodes, nodes)], axis=-1)
+    if plane.joints is not None:
+        marks = levels(xy).reshape(nodes, nodes, 2)
     progress(0.8)
-    curves = _borders(parts, x, y, levels)
-    regions = _regions(solver, plane, parts, x, y)
+    curves = _borders(marks, x, y, levels)
+    regions = _regions(solver, plane, marks[..., 0], x, y)
     for array in (x, y, counts):
         array.flags.writeable = False
     doubtful = int((every % 2).sum()) if solver.arm.revolute.all() else 0
@@ -462,9 +482,13 @@ def _map(solver: _Solver, plane: MapPlane, nodes: int, progress: Callable[[float
     return PostureMap(robot, plane, x, y, counts, curves, regions, solver.respect_limits, doubtful)
 
 
-def _borders(parts: Counts, x: Array, y: Array, levels: Callable[[Array], Counts]) -> tuple[PostureCurve, ...]:
-    """The curves between parts of a map ``(a, b)`` with different numbers, without the rim of the map."""
-    padded = np.pad(parts, 1)
+def _borders(marks: Counts, x: Array, y: Array, levels: Callable[[Array], Counts]) -> tuple[PostureCurve, ...]:
+    """The curves between parts of a map with different numbers, without the rim of the map.
+
+    `marks` ``(a, b, 2)`` has what `levels` says of the nodes.
+    """
+    marks = np.pad(marks, ((1, 1), (1, 1), (0, 0)))
+    padded = marks[..., 0]
     # The rim is outside of everything; a vertex there is NaN, which ends a curve.
     axes = [np.concatenate([[math.nan], values, [math.nan]]) for values in (x, y)]
     found = [
@@ -477,15 +501,16 @@ def _borders(parts: Counts, x: Array, y: Array, levels: Callable[[Array], Counts
         return ()
     nodes = np.concatenate(found)  # of each edge the node inside, the one outside, and the level between
     reached, missed = (np.stack([axes[k][nodes[:, end, k]] for k in (0, 1)], axis=-1) for end in (0, 1))
+    inner, outer = (marks[nodes[:, end, 0], nodes[:, end, 1]] for end in (0, 1))
     level = nodes[:, 2, 0]
     open_ = np.flatnonzero(~np.isnan(missed).any(axis=1))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (reached + missed)[open_]
-        hit = levels(middle)[:, 0] >= level[open_]
+        between = levels(middle)
+        hit = between[:, 0] >= level[open_]
         reached[open_[hit]], missed[open_[~hit]] = middle[hit], middle[~hit]
-    inner, outer = levels(reached[open_]), levels(missed[open_])
-    singular = np.zeros(len(level), dtype=bool)
-    singular[open_] = inner[:, 1] != outer[:, 1]
+        inner[open_[hit]], outer[open_[~hit]] = between[hit], between[~hit]
+    singular = inner[:, 1] != outer[:, 1]
     cuts = np.cumsum([len(loop) for loop in found])[:-1]
     loops_ = zip(np.split(0.5 * (reached + missed), cuts), np.split(singular, cuts), strict=True)
     return tuple(piece for points, kinds in loops_ for piece in _pieces(points, kinds))

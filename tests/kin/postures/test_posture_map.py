@@ -66,6 +66,25 @@ def test_a_node_with_a_number_of_its_own_is_counted_with_care():
     assert named.lonely(np.array([[8, 6], [6, 8]])).tolist() == []
 
 
+@pytest.mark.parametrize("name", ["gofa", "crx10ia", "jaco2", "ur5", "planar3r"])
+def test_no_pose_of_an_arm_is_out_of_its_reach(name):
+    robot = kin.get_robot(name)
+    solver = _Solver.of(Movable.of(robot, kin.JointConstraints()), False, lambda: None)
+    T = kin.fk(robot, np.random.default_rng(4).uniform(-math.pi, math.pi, (4000, robot.n)))
+    assert solver._within_reach(T).all()
+
+
+def test_nodes_out_of_reach_are_not_solved(monkeypatch):
+    robot = kin.get_robot("crx10ia")
+    found = kin.posture_map(robot, resolution=16)
+    near = _Solver.of(Movable.of(robot, kin.JointConstraints()), True, lambda: None)._within_reach(
+        found.plane.poses(robot, np.stack(np.meshgrid(found.x, found.y), axis=-1).reshape(-1, 2))
+    )
+    assert (found.counts > 0).sum() < near.sum() < 0.6 * 16**2
+    monkeypatch.setattr(_Solver, "_within_reach", lambda self, T: np.ones(len(T), dtype=bool))
+    assert (kin.posture_map(robot, resolution=16).counts == found.counts).all()
+
+
 def test_borders_of_a_section_are_singular():
     robot = kin.get_robot("ur5")
     found = kin.posture_map(robot, tilted(0.3, 0.2, 0.3), resolution=40, respect_limits=False)
