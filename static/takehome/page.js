@@ -355,12 +355,13 @@
       error.hidden = !wrong;
     };
     field.addEventListener("change", () => {
-      const typed = read(field.value, turns);
+      const typed = read(field.value, turns, [low, high]);
       const half = 0.5 / 10 ** decimalsOf(turns) / scaleOf(turns); // what the limits on screen are rounded by
       const wrong = typed === null || typed < low - half || typed > high + half;
       accept(wrong);
       const range = Number.isFinite(high - low) ? ` from ${withUnit(low, turns)} to ${withUnit(high, turns)}` : "";
-      error.textContent = wrong ? `A number${range}.` : "";
+      const point = field.value.includes(",") ? ", with a point for decimals" : "";
+      error.textContent = wrong ? `A number${range}${point}.` : "";
       if (!wrong) set(clamp(typed, low, high));
     });
     field.addEventListener("keydown", (event) => {

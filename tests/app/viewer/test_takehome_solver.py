@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from number_cases import DEGREES, READ, REFUSED
 from playwright._impl._driver import compute_driver_executable
 
 import kin
@@ -19,7 +20,7 @@ from app.viewer.takehome.page import SCRIPTS, SavedArm, web_page
 from app.viewer.takehome.solver import solver_of
 from kin.ik.details import OrientationNotMet, RotationError, Solved
 from kin.ik.messages import explain
-from kin.units import DEFAULT_UNITS, typeset
+from kin.units import DEFAULT_UNITS, PLAIN, typeset
 
 ARMS = (
     *("pioneer5", "redundant7-craig", "ur5e", "panda", "crx10ia", "so101", "puma560", "scara", "stanford"),
@@ -27,7 +28,7 @@ ARMS = (
 )
 NUMBER = re.compile(r"\d[\d.]*(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?")
 ASK = """
-const { about, T, seeds } = JSON.parse(require("node:fs").readFileSync(process.argv[2], "utf8"));
+const { about, T, seeds } = require("./asked.json");
 const solver = kinboard.solver(kernels, about, (q) => kernels.fk(q).flat());
 const words = kinboard.words(about, kinboard.numbers({ degrees: true, length: "mm" }).sentence);
 console.log(JSON.stringify(T.map((target, i) => {
@@ -55,16 +56,21 @@ def targets(robot: kin.Robot):
     return T, robot.random_q(rng, 50)
 
 
+def in_node(script: str, asked, folder):
+    """What a script prints that comes after those of the page, and reads `asked`."""
+    parts = [(static_folder() / name).read_text("utf-8") for name in SCRIPTS[:2]]
+    (folder / "run.js").write_text("\n".join([*parts, script]), "utf-8")
+    (folder / "asked.json").write_text(json.dumps(asked), "utf-8")
+    command = [compute_driver_executable()[0], "run.js"]
+    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, encoding="utf-8")
+    return json.loads(done.stdout)
+
+
 def answers(robot: kin.Robot, T, seeds, folder):
     """What the page finds and says."""
     script, about, _ = solver_of(robot)
-    parts = [(static_folder() / name).read_text("utf-8") for name in SCRIPTS[:2]]
-    (folder / "run.js").write_text("\n".join([script, *parts, ASK]), "utf-8")
     asked = {"about": about, "T": T.reshape(-1, 16).tolist(), "seeds": seeds.tolist()}
-    (folder / "asked.json").write_text(json.dumps(asked), "utf-8")
-    command = [compute_driver_executable()[0], "run.js", "asked.json"]
-    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, encoding="utf-8")
-    return json.loads(done.stdout)
+    return in_node(script + ASK, asked, folder)
 
 
 def said(result: kin.IKResult) -> str:
@@ -110,6 +116,24 @@ def test_statuses_postures_and_sentences_are_those_of_the_product(robot_id, tmp_
         assert np.allclose(*numbers, atol=0.11)
     assert "solved" in statuses
     assert len(statuses) > 2 or robot_id == "scara"
+
+
+def test_what_is_typed_is_read_as_in_the_product(tmp_path):
+    cases = [*READ, *((text, unit, None) for text, unit, _ in REFUSED)]
+    cases = [each for each in cases if each[1] is not PLAIN]
+    asked = [
+        (text, unit.is_angle, {"degrees": unit is DEGREES, "length": "mm" if unit.is_angle else unit.name})
+        for text, unit, _ in cases
+    ]
+    script = """
+const read = ([text, turns, units, limits]) => kinboard.numbers(units).read(text, turns, limits);
+console.log(JSON.stringify(require("./asked.json").map(read)));
+"""
+    limited = [("1,250", False, {"degrees": True, "length": "mm"}, limits) for limits in ((0.0, 1.0), (0.0, 2.0))]
+    *found, small, unclear = in_node(script, [*asked, *limited], tmp_path)
+    for (text, _, value), number in zip(cases, found, strict=True):
+        assert number == (None if value is None else pytest.approx(value, rel=1e-14)), text
+    assert (small, unclear) == (pytest.approx(1.25e-3), None)
 
 
 @pytest.mark.full

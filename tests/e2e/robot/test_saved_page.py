@@ -32,17 +32,6 @@ WORST = """([arm, packed, expected]) => {
   }
   return worst;
 }"""
-READ = {  # typed where angles are in degrees
-    "pi/4": np.pi / 4,
-    "-π/2": -np.pi / 2,
-    "2*45": np.pi / 2,
-    "1 rad": 1.0,
-    "90deg - pi/4": np.pi / 4,
-    "10 + 0.5 rad": np.radians(10) + 0.5,
-    "3^2*(4+6)": np.pi / 2,
-    "−30,5": np.radians(-30.5),
-    ".5pi": np.pi / 2,
-}
 MIDDLE = """() => {
   const { target, camera } = kinboardArm.scene;
   const box = document.querySelector("#scene canvas").getBoundingClientRect();
@@ -119,18 +108,9 @@ def test_a_slider_and_a_typed_value_move_the_arm(saved: Page) -> None:
     for key, degrees in (("ArrowRight", 1.0), ("PageUp", 11.0), ("Shift+ArrowDown", 10.9), ("ArrowLeft", 9.9)):
         slider.press(key)
         assert np.isclose(saved.evaluate("kinboardArm.q()")[0], UR5.lower[0] + np.radians(degrees), atol=1e-12)
-    for text, radians in READ.items():
-        field.fill(text)
-        field.press("Enter")
-        assert np.isclose(saved.evaluate("kinboardArm.q()")[2], radians, atol=1e-12), text
-    for text in ("pi/", "2 3", "45 mm", "90deg deg", "1/0", "(1", "--", "2^pi"):
-        field.fill(text)
-        field.press("Enter")
-        expect(field).to_have_attribute("aria-invalid", "true")
-    field.fill("-30,5°")
-    field.press("Enter")
     field.fill("9000")
     field.press("Enter")
+    expect(field).to_have_attribute("aria-invalid", "true")
     expect(saved.get_by_role("alert").filter(has_text="A number from −360.0° to 360.0°.")).to_be_visible()
     field.press("Escape")
     expect(field).to_have_value("−30.5")
