@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kin.angles import TURN
+from kin.axes import NEARLY, size
 from kin.codegen import wrappers
 from kin.codegen.source import plain
 from kin.codegen.types import Constants
@@ -61,6 +62,9 @@ BOUNDS = {
     ("offset7_places_marks_of", "n"): 2 * SAMPLES,
 }
 _ELSE = "Use kin.solve_ik, or the REST service"
+_RIGHT, _SEEN = 0.5 * math.pi, 1e-10
+_ANGLES = ("0", "pi/2 (90°)", "pi (180°)", "-pi/2 (-90°)")
+_TINY = 3e-4  # of the arm's size: such a length counts as rounding, as in kin.solvers.rounded
 
 
 class Alone(NamedTuple):
@@ -221,7 +225,7 @@ def alone(robot: Robot, form: ClosedForm | None) -> Alone:
             robot.id,
             f"a table with exact numbers: this one is near an arm of the family {form.name}, but off by "
             f"{form.off:.1g} rad or of the arm's size, so that every posture is refined on the table as entered. "
-            "Write angles such as pi/2 and lengths with all their digits, or 0",
+            f"Write {_exact(robot) or 'angles such as pi/2 and lengths with all their digits, or 0'}",
         )
     if family := next((each for each in type(form).__mro__ if each in KERNELS), None):
         rows, inner = KERNELS[family]
@@ -232,6 +236,22 @@ def alone(robot: Robot, form: ClosedForm | None) -> Alone:
     if form.redundancies(POSE):
         raise needs_python(robot, form)
     return _by_one(form.kernels, form, robot)
+
+
+def _exact(robot: Robot) -> str:
+    """The numbers of a rounded table that are near right angles or zero, and what they have to be."""
+    found = []
+    for row in robot.rows:
+        angles = {"alpha": row.alpha, **({} if row.moves == "theta" else {"theta": row.theta})}
+        for name, value in angles.items():
+            quarters = round(value / _RIGHT)
+            if _SEEN < abs(value - quarters * _RIGHT) < NEARLY:
+                found.append(f"{name} of {row.name} as {_ANGLES[quarters % 4]}")
+        lengths = {"a": row.a, **({} if row.moves == "d" else {"d": row.d})}
+        found += [
+            f"{name} of {row.name} as 0" for name, x in lengths.items() if 0.0 < abs(x) < _TINY * size(robot)
+        ]
+    return ", ".join(found)
 
 
 def needs_python(robot: Robot, form: ClosedForm) -> InputError:

@@ -52,8 +52,10 @@ def test_an_arm_that_cannot_be_emitted_is_refused_with_why(arm):
 def test_a_table_that_is_near_a_family_is_refused_and_never_emitted_as_that():
     text = kin.robot_to_toml("puma560").replace("90", "89.999").replace('id = "', 'id = "typed-')
     robot = kin.load_robot(text)
-    with pytest.raises(kin.InputError, match=r"exact numbers.*pi/2"):
+    words = r"exact numbers.*Write alpha of .+? as -?pi/2 \(-?90°\), alpha of"
+    with pytest.raises(kin.InputError, match=words) as refused:
         kin.generate(robot)
+    assert str(refused.value).count("alpha of ") == sum(abs(row.alpha) > 1.0 for row in robot.rows)
 
 
 @pytest.mark.parametrize(
