@@ -246,6 +246,8 @@ def test_no_tab_shows_the_table_that_an_exercise_asks_for(server: int, one: Exer
         for serial, form in enumerate(FILES, 1):
             tab.say("feature", ["sheet", [form, serial], None])
         tab.wait(lambda: "The worksheet would contain the table" in shown(tab))
+        tab.say("feature", ["sheet", ["web", 8], None])
+        tab.wait(lambda: "The page would contain what the open question asks for" in shown(tab))
         tab.say("feature", ["sheet", ["page", 9], None])
         tab.wait(lambda: 'data-sheet="9"' in tab.html)
         assert not any("FileTransfer" in message["type"] for message in tab.log)
