@@ -242,12 +242,12 @@ def _exact(robot: Robot) -> str:
     """The numbers of a rounded table that are near right angles or zero, and what they have to be."""
     found = []
     for row in robot.rows:
-        angles = {"alpha": row.alpha, **({} if row.moves == "theta" else {"theta": row.theta})}
+        angles = {"alpha": row.alpha, **({} if row.kind == "revolute" else {"theta": row.theta})}
         for name, value in angles.items():
             quarters = round(value / _RIGHT)
             if _SEEN < abs(value - quarters * _RIGHT) < NEARLY:
                 found.append(f"{name} of {row.name} as {_ANGLES[quarters % 4]}")
-        lengths = {"a": row.a, **({} if row.moves == "d" else {"d": row.d})}
+        lengths = {"a": row.a, **({} if row.kind == "prismatic" else {"d": row.d})}
         found += [
             f"{name} of {row.name} as 0" for name, x in lengths.items() if 0.0 < abs(x) < _TINY * size(robot)
         ]
