@@ -169,8 +169,10 @@
     if (step === before || before === "" || (head && !goesOn)) return;
     const from = goesOn ? steps : goal;
     const { top, bottom } = viserPage.panel().getBoundingClientRect();
-    const at = from.getBoundingClientRect().top;
-    if (document.documentElement.hasAttribute("data-kb-narrow") || at < top || at > (top + bottom) / 2) {
+    const box = from.getBoundingClientRect();
+    // Of a step, the buttons at its end are seen too, one of which may have the focus.
+    const isLow = goesOn ? box.bottom > bottom : box.top > (top + bottom) / 2;
+    if (document.documentElement.hasAttribute("data-kb-narrow") || box.top < top || isLow) {
       if (from.getClientRects().length) from.scrollIntoView({ block: "start" });
     }
   }

@@ -97,9 +97,7 @@ def test_a_lesson(tab: Tab) -> None:
     tab.select(PUMA)
     page.get_by_role("tab", name="Learn").press("Enter")
     lesson = tab.row("Lesson").locator("input:visible").first
-    expect(lesson).to_be_visible()
-    tab.rest()  # a menu that is opened while its tab still grows is closed again
-    lesson.press("Enter")
+    lesson.focus()  # its menu opens; Enter would choose what is marked there: None
     marked = page.locator("[role=option][data-combobox-selected]")
     expect(page.get_by_role("option", name="Postures")).to_be_visible()
     for _ in range(page.get_by_role("option").count()):

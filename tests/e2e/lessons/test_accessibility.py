@@ -182,7 +182,6 @@ def test_a_lesson_by_keyboard_alone_and_the_tree_of_each_step(tab: Tab) -> None:
         page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     keys.reach("[role=tabpanel] input[aria-label=Lesson], input[aria-haspopup=listbox]:not([value='Pioneer arm'])")
-    page.keyboard.press("Enter")
     for _ in range(len(LESSONS) + 2):
         if page.locator("[role=option][data-combobox-selected]", has_text=EquationsLesson.title).count():
             break
