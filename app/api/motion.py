@@ -36,7 +36,6 @@ MOST_RATE = 1000.0  # samples per second
 MOST_SAMPLES = 1_000_000
 NUMBER = 21  # bytes of a number in JSON, about
 _sampling = threading.Lock()  # samples are made by Python: two threads would take as long, and visitors wait twice
-_OWN_FIELDS = ("program", "q_start", "qd_start", "qdd_start")  # all others are of the program
 
 EXAMPLES = {
     "ptp": example(

@@ -105,12 +105,3 @@ def axes_text(T: Array) -> str:
     """Where the axes of a frame point."""
     columns = (f"{axis} = ({', '.join(fixed(float(v), 2) for v in T[:3, j])})" for j, axis in enumerate(AXES))
     return f"its axes: {', '.join(columns)}"
-
-
-def joints_text(variant: Variant, q: Array, units: Units) -> str:
-    """Joint values, such as ``joint 1 at 30°, joint 2 at 45°``."""
-    robot = variant.robot
-    return ", ".join(
-        f"joint {i + 1} at {units.of(bool(turns)).text(float(value), 1)}"
-        for i, (value, turns) in enumerate(zip(q, robot.revolute, strict=True))
-    )

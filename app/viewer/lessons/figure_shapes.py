@@ -5,7 +5,7 @@ Everything is in one frame, in metres and radians.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -101,14 +101,6 @@ def clear_of(start: ArrayLike, end: ArrayLike, others: Iterable[ArrayLike]) -> A
     if far > 1e-3 * max(float(np.linalg.norm(away)), float(np.linalg.norm(b - a)), TINY):
         return np.asarray(across / far)
     return perpendicular_to(e) if e.any() else np.array([0.0, 0.0, 1.0])
-
-
-def plane_corners(center: ArrayLike, normal: ArrayLike, reach: float) -> Sequence[Array]:
-    """The corners of a square about a center, of 2 `reach` (m) each side, for a `Face` of four corners."""
-    at, z = np.asarray(center, float), unit(np.asarray(normal, float))
-    x = perpendicular_to(z)
-    y = cross(z, x)
-    return [at + reach * (i * x + j * y) for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
 
 
 def unit(v: Array) -> Array:

@@ -45,7 +45,6 @@ _LOWEST = 0.03  # least height of the camera above the floor, in these radii: fr
 _SMALL_PICTURE = 420  # pixels
 _ABOVE = 0.3  # room above a target for the number that is written there, in these radii
 _OUTLOOK = 5.0  # in these radii: a target farther away is not shown
-_FARTHEST_FIT = 12.0  # in these radii: what is drawn farther away is not fitted into the picture
 _SMALLEST = 0.01  # metres; viser's own limit of zooming in
 _INSIDE = 0.88  # share of the picture, in both directions, that contains the extra points: they have labels
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera

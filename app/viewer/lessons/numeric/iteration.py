@@ -84,11 +84,6 @@ class Problem:
         moved = np.abs(self._all_rows(q)).max(axis=(0, 2))[: len(off)] > RANK
         return np.flatnonzero(moved | off)
 
-    @property
-    def is_square(self) -> bool:
-        """Whether there are as many joints as rows."""
-        return len(self.rows) == self.robot.n
-
     @cached_property
     def is_finite(self) -> bool:
         """Whether the joints change as many components independently as there are joints: no self-motion."""

@@ -14,7 +14,7 @@ import kin
 from app.viewer.lessons import figure_nodes
 from app.viewer.lessons.dh import steps
 from app.viewer.lessons.figure_nodes import FigureNodes
-from app.viewer.lessons.figure_shapes import arc, clear_of, plane_corners, ruler
+from app.viewer.lessons.figure_shapes import arc, clear_of, ruler
 from app.viewer.lessons.label_room import label_room
 from app.viewer.scene.meshes import body
 from kin.transforms import Array
@@ -99,7 +99,7 @@ def test_an_angle_has_its_arc_between_its_sides(angle: float) -> None:
 
 
 def test_a_face_is_a_fan_of_triangles_over_its_corners() -> None:
-    corners = plane_corners((1, 2, 3), (0, 0, 1), 0.5)
+    corners = [(1.5, 2.5, 3), (0.5, 2.5, 3), (0.5, 1.5, 3), (1.5, 1.5, 3)]
     (face,) = FigureNodes(SIZE).face("plane", corners)
     triangles = face.props["vertices"][face.props["faces"]]
     areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
