@@ -44,6 +44,14 @@
   addEventListener("click", (event) => {
     event.target.closest?.("[data-guide-open]")?.parentElement.querySelector("[data-guide-file]").click();
   });
+  // A click in a map: where, as shares of its width and its height, from the left and from below.
+  addEventListener("click", ({ target, clientX, clientY }) => {
+    const map = target.closest?.("[data-guide-map]");
+    if (!map) return;
+    const { left, bottom, width, height } = map.querySelector("image").getBoundingClientRect();
+    const [x, y] = [(clientX - left) / width, (bottom - clientY) / height];
+    if (x >= 0 && x <= 1 && y >= 0 && y <= 1) send(map, "map", [x, y]);
+  });
   async function upload(input) {
     const file = input.files[0];
     input.value = "";

@@ -258,6 +258,13 @@ def few(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
     return [label for label in labels if round(label[0] / step) % every == 0]
 
 
+def cross(at: Array) -> tuple[str, str]:
+    """A cross at a place on the page ``(2,)``, black with a white edge, as marks."""
+    x, y = at.tolist()
+    path = f'<path d="M{x - 6.0:.1f} {y:.1f}h12M{x:.1f} {y - 6.0:.1f}v12" stroke="{{}}" stroke-width="{{}}"/>'
+    return path.format("#fff", 4), path.format("#000", 1.6)
+
+
 def text_of(name: str) -> str:
     """A name as the text of an element. XML has no control characters, not even escaped: they become a mark."""
     return escape(_NO_XML.sub("\ufffd", name))

@@ -150,6 +150,7 @@ class PostureMap:
         regions: the connected parts, without those of a few nodes; of a section only those with a posture.
         respect_limits: whether only postures inside the joint limits count.
         doubtful: number of nodes with an odd number of postures without limits: one of them may be missing.
+        task: what of a pose a posture meets.
     """
 
     robot: Robot
@@ -161,6 +162,7 @@ class PostureMap:
     regions: tuple[PostureRegion, ...]
     respect_limits: bool
     doubtful: int
+    task: Task
 
     def __repr__(self) -> str:
         """Its nodes, regions and numbers."""
@@ -479,7 +481,7 @@ def _map(solver: _Solver, plane: MapPlane, nodes: int, progress: Callable[[float
         array.flags.writeable = False
     doubtful = int((every % 2).sum()) if solver.arm.revolute.all() else 0
     progress(1.0)
-    return PostureMap(robot, plane, x, y, counts, curves, regions, solver.respect_limits, doubtful)
+    return PostureMap(robot, plane, x, y, counts, curves, regions, solver.respect_limits, doubtful, solver.task)
 
 
 def _borders(marks: Counts, x: Array, y: Array, levels: Callable[[Array], Counts]) -> tuple[PostureCurve, ...]:

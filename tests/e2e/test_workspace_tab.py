@@ -88,3 +88,26 @@ def test_a_cut_and_the_section_plot(tab: Tab) -> None:
     expect(tab.page.locator("[data-cloud]")).to_have_attribute("data-cloud", "ready")
     tab.check("Section plot")
     expect(tab.page.locator("[data-plot=section]")).to_have_count(0)
+
+
+@pytest.mark.full
+def test_a_click_in_a_posture_map_lists_the_postures_of_the_place(tab: Tab) -> None:
+    tab.show(kin.get_robot("ur5"))
+    tab.page.get_by_role("tab", name="Workspace").click()
+    folder = tab.page.get_by_role("button", name="Postures", exact=True)
+    if folder.get_attribute("aria-expanded") != "true":
+        folder.click()
+    tab.page.get_by_role("button", name="Start").last.click()
+    nodes = tab.page.locator("[data-guide-map] image")
+    expect(nodes).to_have_count(1, timeout=COLD)
+    expect(tab.page.get_by_text(re.compile(r"regions?\. A: "))).to_be_visible(timeout=COLD)
+    tab.page.get_by_role("button", name="A", exact=True).click()
+    rows = tab.page.locator("[data-posture]")
+    expect(rows.first).to_be_visible()
+    nodes.scroll_into_view_if_needed()
+    box = nodes.bounding_box()
+    assert box is not None
+    tab.page.mouse.click(box["x"] + 2, box["y"] + 2)  # the corner of the map is out of reach
+    expect(tab.page.get_by_text("No posture at the place chosen.")).to_be_visible()
+    expect(tab.status).to_contain_text("Out of reach")
+    expect(rows).to_have_count(0)

@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 import kin
-from app.exports.postures import FORMATS, LINES, colours
+from app.exports.postures import FORMATS, SINGULAR, colours
+from kin.units import typeset
 
 
 @pytest.fixture(scope="module")
@@ -23,19 +24,19 @@ def test_a_picture_says_in_words_what_it_shows(found):
     root = ElementTree.fromstring(FORMATS["svg"].write(found))
     text = {each.tag.rpartition("}")[2]: each.text for each in root}
     assert text["title"] == "Postures of UR5"
-    assert text["desc"] == found.reason
+    assert text["desc"] == typeset(found.reason)
     words = [each.text for each in root.iter() if each.tag.endswith("text")]
     assert {region.name for region in found.regions} <= set(words)
     assert {str(number) for number in np.unique(found.counts)} <= set(words)
     strokes = [each.get("stroke") for each in root if each.tag.endswith("path") and each.get("fill") == "none"]
-    assert strokes == [LINES[curve.kind] for curve in found.curves]
+    assert strokes == [SINGULAR if curve.kind == "singular" else "currentColor" for curve in found.curves]
 
 
-def test_a_plane_of_joints_has_axes_in_degrees():
+def test_a_plane_of_joints_has_axes_in_degrees_and_millimetres():
     robot = kin.get_robot("scara")
     text = FORMATS["svg"].write(kin.posture_map(robot, joints=(1, 2), resolution=10)).decode()
     assert f"{robot.joints[1].name}, °</text>" in text
-    assert f"{robot.joints[2].name}, m</text>" in text
+    assert f"{robot.joints[2].name}, mm</text>" in text
 
 
 def test_hostile_names_are_text(found):

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from app.exports.curves import Curve, Row, with_legend
-from app.exports.svg import Axes, Plot, chart, png_url
+from app.exports.svg import Axes, Plot, chart, cross, png_url
 from app.viewer.lessons.numeric.basins import COLOURS, Basins, pixels, turned_within
 from app.viewer.lessons.numeric.iteration import MOST, Method, Problem, Run
 from app.viewer.views.templates import render
@@ -224,9 +224,7 @@ def _basins_label(basins: Basins, name: str) -> str:
 def mark_html(basins: Basins, start: Array) -> str:
     """The present start, a layer over the picture."""
     plot = _plot(basins)
-    x, y = plot.at(np.remainder(start + math.pi, 2.0 * math.pi) - math.pi).tolist()
-    cross = f'<path d="M{x - 6:.1f} {y:.1f}h12M{x:.1f} {y - 6:.1f}v12" stroke="{{}}" stroke-width="{{}}"/>'
-    marks = (cross.format("#fff", 4), cross.format("#000", 1.6))
+    marks = cross(plot.at(np.remainder(start + math.pi, 2.0 * math.pi) - math.pi))
     return render("numeric/mark", chart=chart((), marks, (), "the present start", _size(plot)))
 
 

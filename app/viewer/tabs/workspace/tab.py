@@ -28,7 +28,7 @@ from app.viewer.tabs.workspace.cloud import CloudView
 from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import Click, Clicks, search
-from app.viewer.tabs.workspace.postures import Postures
+from app.viewer.tabs.workspace.postures.panel import Postures
 from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.section.panel import SectionPanel, count, subscribe_section
@@ -51,6 +51,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     key: ClassVar[str] = "workspace"
     title: ClassVar[str] = "Workspace"
     shared: ClassVar[bool] = True
+    messages = frozenset({"map"})
     kernels = (CLOUDS,)
     settings_of, facts_of = WorkspaceSettings, Facts
 
@@ -75,6 +76,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             "click": self._click,
             "capability": self._capability.handle,
             "postures": self._postures.handle,
+            "map": lambda press, value: self._postures.handle(("map", press), value),
         }
         self._clouds.report()
 
@@ -203,9 +205,11 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._moved = time.perf_counter()
+        self._postures.on_pose(T_base_tool)
         if self._section is not None:
             self._section.turn(T_base_tool[:3, 3])
-            self.due = min(self.due, DOT) if self.due is not None else DOT
+        dues = self.due, self._postures.due, None if self._section is None else DOT
+        self.due = min((due for due in dues if due is not None), default=None)
 
     def tick(self, now: float) -> None:
         moving = now - self._moved < MOVED
@@ -382,7 +386,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def extents(self) -> Sequence[Sphere]:
         mapped, corners = self._capability.extent, self._axes.corners
-        found = [*self._clouds.extents, *([] if mapped is None else [mapped])]
+        found = [*self._clouds.extents, *([] if mapped is None else [mapped]), *self._postures.extents()]
         return found if corners is None else [*found, round_points(corners)]
 
     # Cut

@@ -1,11 +1,15 @@
-"""The folder of posture maps: coarse to fine, in words, and its regions as targets."""
+"""The folder of posture maps: coarse to fine, in words, its places as targets, and the loop of a cuspidal arm."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bare_page import BarePage, bare_page
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -15,8 +19,13 @@ from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import NODES, PostureRequest, Summaries
+from app.viewer.lessons.postures.survey import Posture
 from app.viewer.server import ViewerServer
-from app.viewer.tabs.workspace.postures import PostureSettings
+from app.viewer.tabs.workspace.postures import views
+from app.viewer.tabs.workspace.postures.panel import Postures
+from app.viewer.tabs.workspace.postures.settings import PostureSettings
+from kin.angles import wrapped
+from kin.units import DEFAULT_UNITS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -90,3 +99,226 @@ def test_maps_come_coarse_to_fine_and_are_shared():
 def test_a_wrong_setting_is_named(name, value):
     with pytest.raises(kin.InputError, match=name):
         PostureSettings.spec(name).unpack(name, value, UR5)
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch) -> Iterator[BarePage]:
+    """The folder alone, with coarse maps."""
+    monkeypatch.setattr("app.shared.summaries.NODES", (12,))
+    summaries = Summaries(threads=1)
+    with bare_page(UR5) as opened:
+        opened.summaries = summaries  # type: ignore[attr-defined]
+        opened.open(Postures)
+        yield opened
+    summaries.close()
+
+
+def mapped(page: BarePage, plane: str = "vertical") -> kin.postures.PostureMap:
+    """A map of the arm on show."""
+    folder = page.feature
+    assert isinstance(folder, Postures)
+    folder.change(plane=plane)
+    page.press("Posture map", "Start")
+    page.rest()
+    work = page.summaries.postures(folder.settings.request)  # type: ignore[attr-defined]
+    found = work.future.result(60.0)
+    page.rest()
+    assert folder.facts.map is found
+    return found
+
+
+def click(page: BarePage, x: float, y: float) -> tuple[Posture, ...]:
+    """Click at these shares of the width and the height of the map; returns the postures in the list."""
+    page.post(("feature", "postures", ("map", 1)), [x, y])
+    page.rest()
+    assert isinstance(page.feature, Postures)
+    return page.feature.settings.postures
+
+
+def ghosts(page: BarePage) -> int:
+    return sum(kind.startswith("Batched") for kind, _, _ in page.scene())
+
+
+def words(page: BarePage) -> str:
+    return json.dumps(page.panel(), ensure_ascii=False)
+
+
+def at_node(found: kin.postures.PostureMap, i: int, j: int) -> tuple[float, float]:
+    """The shares of the width and the height at which a node is."""
+    a, b = found.counts.shape
+    return i / (a - 1), j / (b - 1)
+
+
+def test_a_click_in_the_map_shows_as_many_postures_as_are_counted_there(page):
+    found = mapped(page)
+    for node in np.argwhere(found.counts == 8)[:2].tolist() + np.argwhere(found.counts == 0)[:1].tolist():
+        there = click(page, *at_node(found, *node))
+        assert len(there) == found.counts[*node]
+        place = np.array([[found.x[node[0]], found.y[node[1]]]])
+        T = found.plane.poses(UR5, place)[0]
+        assert np.allclose(page.targets[-1], T), "it is the target"
+        for posture in there:
+            assert np.allclose(kin.fk(UR5, posture.q), T)
+            assert UR5.in_limits(posture.q)
+        assert ghosts(page) == len(there)
+    assert "No posture at the place chosen." in words(page)
+
+
+def test_a_posture_of_the_list_is_driven_to_and_has_no_ghost_then(page):
+    found = mapped(page)
+    i, j = np.argwhere(found.counts == 8)[0].tolist()
+    there = click(page, *at_node(found, i, j))
+    page.press("Go to posture", "3")
+    page.rest()
+    assert np.array_equal(page.now.goal, there[2].q)
+    assert "data-here" in words(page)
+    assert ghosts(page) == 7
+    page.set("Draw in the scene", False)
+    page.rest()
+    assert not page.scene()
+
+
+def test_a_posture_outside_the_limits_is_listed_and_not_driven_to(page):
+    robot = STORE.get("irb120")
+    page.change(robot)
+    page.set("Inside limits", False)
+    found = mapped(page)
+    i, j = np.argwhere(found.counts == found.counts.max())[0].tolist()
+    there = click(page, *at_node(found, i, j))
+    assert len(there) == found.counts.max()
+    blocked = [k for k, posture in enumerate(there) if not posture.available]
+    assert blocked
+    page.press("Go to posture", str(blocked[0] + 1))
+    page.rest()
+    assert page.notices[-1].title.startswith("Not available")
+    assert np.array_equal(page.now.goal, robot.q_home)
+
+
+def test_a_region_of_a_plane_of_joints_is_gone_to(page):
+    found = mapped(page, "joints")
+    page.press("Go to region", "A")
+    page.rest()
+    assert np.allclose(page.now.goal[[1, 2]], found.regions[0].place)
+    assert np.array_equal(page.now.goal[[0, 3, 4, 5]], UR5.q_home[[0, 3, 4, 5]])
+    assert not any(kind.startswith("Image") for kind, _, _ in page.scene()), "it lies nowhere in the scene"
+
+
+def test_an_arm_whose_postures_have_no_names_shows_them_all(page):
+    robot = STORE.get("crx10ia")
+    page.change(robot)
+    found = mapped(page)
+    i, j = np.argwhere(found.counts > 2)[0].tolist()
+    there = click(page, *at_node(found, i, j))
+    assert [posture.name for posture in there] == [str(k + 1) for k in range(len(there))]
+    assert len(there) == found.counts[i, j]
+
+
+@pytest.mark.parametrize("value", [None, [0.5], [0.5, 1.1], [-0.1, 0.5], [float("nan"), 0.5], ["0.5", 0.5]])
+def test_a_click_that_is_none_is_refused(page, value):
+    with pytest.raises(kin.InputError, match="map"):
+        page.feature.heard(("map", 1), value)
+
+
+def test_a_late_click_does_nothing(page):
+    assert click(page, 0.5, 0.5) == ()
+    assert not page.targets
+
+
+def test_a_section_lies_in_the_scene_where_its_nodes_are(page):
+    found = mapped(page)
+    (image,) = [(T, props) for kind, T, props in page.scene() if kind.startswith("Image")]
+    T = np.vstack([np.reshape(image[0], (3, 4)), [0.0, 0.0, 0.0, 1.0]])
+    a, b = found.counts.shape
+    # viser turns a picture by half a turn about x, so that its rows go down along y.
+    for i, j in ((0, 0), (a - 1, 0), (3, b - 2)):
+        across = ((i + 0.5) / a - 0.5) * image[1]["render_width"]
+        down = ((b - 1 - j + 0.5) / b - 0.5) * image[1]["render_height"]
+        place = found.plane.poses(UR5, np.array([[found.x[i], found.y[j]]]))[0, :3, 3]
+        assert np.allclose((T @ [across, down, 0.0, 1.0])[:3], place)
+    drawn = views.section_nodes(found, dark=True)[0].props["image"]
+    assert (drawn[0, :, 3] > 0).tolist() == (found.counts[:, -1] > 0).tolist()
+
+
+def test_colours_of_the_map_are_those_of_the_page(page):
+    html = views.map_html(mapped(page), DEFAULT_UNITS)
+    assert 'fill="#fff"' not in html
+    assert "data-guide-map" in html
+    assert "along u, mm" in html
+
+
+LOOP = np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [0.15, 0.2, 0.3, 0.4, 0.5, 0.6], [0.1, 0.2, 0.3, 0.7, 0.5, 0.6]])
+
+
+@pytest.fixture
+def verdict(monkeypatch):
+    """What is found of any arm."""
+    found = kin.postures.Cuspidality(UR5, "yes", "loop", LOOP, True, 0.02, 8, 3)
+    asked = SimpleNamespace(found=found)
+    monkeypatch.setattr("app.shared.summaries.cuspidal", lambda *_, **__: asked.found)
+    return asked
+
+
+def judged(page: BarePage) -> None:
+    page.press("Cuspidal or not")
+    page.rest()
+    page.summaries.cuspidality(page.now.robot, page.now.options.constraints).future.result(60.0)  # type: ignore[attr-defined]
+    page.rest()
+
+
+def test_the_loop_of_a_cuspidal_arm_is_driven_round(page, verdict):
+    judged(page)
+    assert "stays above 0.02" in words(page)
+    assert [kind for kind, _, _ in page.scene()] == ["LineSegmentsHandle", "BatchedMeshHandle"], "loop and start"
+    seen: list[np.ndarray] = []
+    page.move_to, plain = lambda q, *more, **named: (seen.append(q), plain(q, *more, **named)), page.move_to
+    page.press("Play the loop")
+    page.rest()
+    assert np.array_equal(seen[0], LOOP[0])
+    assert np.array_equal(page.now.goal, LOOP[-1])
+    assert np.abs(np.diff(seen, axis=0)).max() < 0.06
+    assert any(np.allclose(q, LOOP[1], atol=0.02) for q in seen)
+    assert page.notices[-1].title == "The tool is back in another posture"
+    assert "Joint 4 is 17.2° from where it was" in page.notices[-1].detail
+    assert "Play the loop" in words(page)
+
+
+def test_another_motion_of_the_arm_ends_the_loop(page, verdict):
+    judged(page)
+    page.feature.on_loop()
+    page.feature._play(0.1)
+    assert page.feature.settings.loop.passed > 0
+    page.pose(UR5.q_home)
+    assert page.feature.settings.loop is None
+    assert np.array_equal(page.now.goal, UR5.q_home)
+
+
+def test_a_loop_outside_the_limits_is_said_and_not_driven(page, verdict):
+    verdict.found = replace(verdict.found, in_limits=False)
+    judged(page)
+    assert "with the joint limits left aside" in words(page)
+    assert "Play the loop" not in words(page)
+
+
+def test_an_arm_that_is_not_cuspidal_says_why(page):
+    judged(page)
+    assert "Not cuspidal: each posture is a combination of signs" in words(page)
+    assert "Play the loop" not in words(page)
+    page.change(STORE.get("panda"))
+    page.press("Cuspidal or not")
+    page.rest()
+    with pytest.raises(kin.InputError):
+        page.summaries.cuspidality(page.now.robot, page.now.options.constraints).future.result(60.0)
+    page.rest()
+    assert "lock the others" in words(page)
+
+
+@pytest.mark.full
+def test_the_gofa_comes_back_in_another_posture(page):
+    """With the loop that is found, not one that a test has made."""
+    page.change(STORE.get("gofa"))
+    judged(page)
+    found = page.feature.facts.drivable
+    assert found is not None
+    first, last = kin.fk(found.robot, found.loop[[0, -1]])
+    assert np.allclose(first, last, atol=1e-6)
+    assert np.abs(wrapped(found.loop[-1] - found.loop[0])).max() > 0.05
