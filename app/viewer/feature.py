@@ -266,6 +266,11 @@ class Feature:
         """What has failed and stands, as words after "Ready, but"; "" if nothing has."""
         return ""
 
+    @property
+    def offer(self) -> str:
+        """What can be done about where the arm is, as HTML for the status card; "" if there is nothing."""
+        return ""
+
     def extents(self) -> Sequence[Sphere]:
         """Spheres around what it shows in the scene. *Fit* includes them in the picture with the arm."""
         return ()

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import viser
+from markupsafe import Markup
 
 from app.exports.worksheet.sheet import indexed
 from app.shared.answers.inspection import singular_at
@@ -137,7 +138,7 @@ def _kind(result: IKResult) -> Kind:
     return "unreachable"
 
 
-def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "") -> str:
+def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "", offer: str = "") -> str:
     """The notice as a card, with what is added to it. ``static/layout.css`` places it over the scene.
 
     A notice that all is well is no longer blue or green beside a warning or a failure, and the card says both.
@@ -150,7 +151,13 @@ def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "")
     if shown.kind != "error":  # which says what was typed
         shown = replace(shown, title=indexed(typeset(shown.title)), detail=indexed(typeset(shown.detail)))
     return render(
-        "panel/status", notice=shown, warning=typeset(warning), waiting=waiting, symbol=symbol, color=color
+        "panel/status",
+        notice=shown,
+        warning=typeset(warning),
+        waiting=waiting,
+        symbol=symbol,
+        color=color,
+        offer=Markup(offer),
     )
 
 
@@ -171,7 +178,7 @@ class StatusLine:
         self._news_since: float | None = None
         self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
-        self._warning = self._waiting = self._failure = ""
+        self._warning = self._waiting = self._failure = self._offer = ""
         self._cover: Notice | None = None
         self._html = add_html(gui, html(first))
 
@@ -202,6 +209,12 @@ class StatusLine:
             self._failure = failure
             self._write()
 
+    def offer(self, offer: str) -> None:
+        """Show HTML of what can be done below every notice, until the next call; "" ends it."""
+        if offer != self._offer:
+            self._offer = offer
+            self._write()
+
     def wait(self, waiting: str) -> None:
         """Show what the visitor waits for, until the next call; nothing if it is empty."""
         if waiting != self._waiting:
@@ -217,7 +230,7 @@ class StatusLine:
         if self._cover is not None:
             update_html(self._html, html(self._cover))
             return
-        update_html(self._html, html(self._shown, self._warning, self._waiting, self._failure))
+        update_html(self._html, html(self._shown, self._warning, self._waiting, self._failure, self._offer))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

@@ -58,6 +58,7 @@ from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState
 from app.viewer.session.worker.worker import Worker
+from app.viewer.step_out import StepOut
 from app.viewer.tabs import TABS
 from app.viewer.tabs.program.tab import ProgramTab
 from app.viewer.tabs.robot.calibrate.feature import Calibrate
@@ -393,6 +394,7 @@ class VisitorPage(ShownArm, Worker):
                     if feature.due is not None:
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
                 self.status.fail(next((feature.failure for feature in self.features if feature.failure), ""))
+                self.status.offer(next((feature.offer for feature in self.features if feature.offer), ""))
             if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
                 self._save()  # in the same frame, so that nothing is on show that a reload would lose
             self.live.publish(self._result)
@@ -485,6 +487,8 @@ class VisitorPage(ShownArm, Worker):
             if RobotTab in self.offered:
                 own = tabs[self.offered.index(RobotTab)]
                 features, containers = (*features, Motors, Calibrate), [*containers, own, own]
+            if not self._looking:
+                features, containers = (*features, StepOut), [*containers, self.panel.obstacles]
             if ProgramTab in self.offered:
                 features, containers = (*features, Connect), [*containers, tabs[self.offered.index(ProgramTab)]]
             for tab, container in zip(features, containers, strict=True):

@@ -26,7 +26,6 @@ from app.viewer.lessons.velocity.views import SAMPLE, State, lost_words, nice, r
 from app.viewer.null_space import NullSpace, margin, measure, null_space, secondary
 from app.viewer.scene.meshes import body
 from kin import Robot
-from kin.escape import Exit, Exits
 from kin.ik import Singularity, Task
 from kin.transforms import Array
 
@@ -94,28 +93,6 @@ class VelocityFacts(Facts[VelocitySettings]):
     def lost_words(self) -> Sequence[str]:
         """These directions in words."""
         return [lost_words(twist, self.T[:3, :3], slowest=self.state == "near") for twist in self.twists]
-
-    @cached_property
-    def leaving(self) -> Array | None:
-        """The configuration ``(n,)`` whose ways out are shown; None: none are, or the arm was moved since."""
-        wanted, driven = self.settings.leaving, self.settings.driven
-        if wanted is None:
-            return None
-        at = wanted if driven is None else driven[0][driven[1]]
-        return wanted if np.array_equal(at, self.arm.goal) else None
-
-    @property
-    def exits(self) -> Exits | None:
-        """The ways out; None: none are shown, or they are still searched."""
-        found = self.work("exits").value
-        return found if self.leaving is not None and isinstance(found, Exits) else None
-
-    @property
-    def exit(self) -> Exit | None:
-        """The one that is drawn before it is driven."""
-        found = self.exits
-        hidden = found is None or self.settings.driven is not None or self.settings.exit >= len(found.exits)
-        return None if found is None or hidden else found.exits[self.settings.exit]
 
     @cached_property
     def least(self) -> tuple[Array, float]:

@@ -14,15 +14,17 @@ import numpy as np
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Node as SceneNode
-from app.viewer.declared.work import Sweep, Work
+from app.viewer.declared.work import Sweep
+from app.viewer.drive import FRAME
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.velocity import exits, section_views, views
+from app.viewer.lessons.velocity import section_views, views
 from app.viewer.lessons.velocity.drawing import force_scale, lost_ends, scene, truncated
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.jog import BUTTONS, button, step
-from app.viewer.lessons.velocity.null_motion import FRAME, MOVING, after
+from app.viewer.lessons.velocity.null_motion import MOVING, after
 from app.viewer.lessons.velocity.questions import outline
 from app.viewer.lessons.velocity.settings import FIRST, LARGEST, VelocitySettings
+from app.viewer.step_out import FINDING, STEP_HINT
 from kin.transforms import Array
 
 HOLD = 10.0  # steps a second while a button is held
@@ -39,7 +41,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     about = "The velocities and forces of the tool: Jacobian, ellipsoids, singularities."
     outline = staticmethod(outline)
     settings_of, facts_of = VelocitySettings, VelocityFacts
-    undo: ClassVar[dict[str, str]] = {"on_jog": "Jog", "on_drive": "Step out"}
+    undo: ClassVar[dict[str, str]] = {"on_jog": "Jog"}
 
     # What is shown
 
@@ -50,7 +52,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             *self.unless_asked(
                 "singularities",
                 Html(views.warning_html, (robot, f.found, units, f.lost_words)),
-                self._step_out(f),
+                Button("Step out", self.event(self.on_step_out), STEP_HINT, visible=f.state != "far"),
             ),
             Control("frame"),
             Folder("Jacobian", self.unless_asked(
@@ -90,9 +92,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
 
     def scene(self) -> Sequence[SceneNode]:
         eye = np.asarray(self.stage.client.camera.position)
-        nodes = scene(self.facts, self.read, eye, self.stage.activity.withheld)
-        shown = None if self.hides("singularities") else self.facts.exit
-        return nodes if shown is None else [*nodes, exits.drawn(self.facts.robot, shown)]
+        return scene(self.facts, self.read, eye, self.stage.activity.withheld)
 
     def legend(self) -> str:
         f, s = self.read, self.settings
@@ -126,23 +126,6 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         args = (f.robot, f.task, f.space, f.speeds, f.measure, f.margin)
         return Html(section_views.null_and_margin_html, args)
 
-    def _step_out(self, f: VelocityFacts) -> Folder:
-        """The button, or the ways out."""
-        found = f.exits
-        if f.leaving is None:
-            button = Button("Step out", self.event(self.on_step_out), exits.STEP_HINT)
-            return Folder(None, [button], key="step out", visible=f.state != "far")
-        if found is None:
-            return Folder(None, [Html(exits.searching_html)], key="step out")
-        ways = 0 if self.settings.driven is not None else len(found.exits)
-        choices = {str(k + 1): self.event(self.on_exit, k) for k in range(ways)}
-        return Folder(None, [
-            Html(exits.exits_html, (found, self.settings.exit, self.stage.units)),
-            *([Buttons("Way out", choices, exits.EXIT_HINT, of=id(found))] if len(choices) > 1 else []),
-            *([Button("Drive there", self.event(self.on_drive), exits.DRIVE_HINT)] if choices else []),
-            Button("Stay here", self.event(self.on_stay), exits.STAY_HINT, key="stay"),
-        ], key="step out")  # fmt: skip
-
     # What events do
 
     def changed(self, path: str) -> None:
@@ -168,30 +151,9 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             stage.move_to(made.q, made.notice)
 
     def on_step_out(self) -> None:
-        self.change(leaving=self.stage.now.goal, exit=0, driven=None, runs=False)
-
-    def on_exit(self, which: int) -> None:
-        if self.settings.driven is None:
-            self.change(exit=which)
-
-    def on_stay(self) -> None:
-        if self.settings.driven is not None:
-            self.stage.notify(exits.STAYED)
-        self.change(leaving=None, driven=None)
-
-    def on_drive(self) -> None:
-        """Drive the way out that is drawn; frame by frame if the tool is to stay where it is between waypoints."""
-        shown, found, stage = self.facts.exit, self.facts.exits, self.stage
-        if shown is None or found is None:
-            return
-        locked = exits.locked(stage.now, shown)
-        if locked:
-            stage.notify(locked)
-        elif shown.keeps_tool:
-            self.change(driven=(shown.q, 0))
-        else:
-            self.change(leaving=None)
-            stage.move_to(shown.q[-1], exits.left(found, shown, stage.units))
+        """Offer the ways out in the status card."""
+        self.change(runs=False)
+        self.stage.post(FINDING)
 
     def on_least(self) -> None:
         size = float(np.linalg.norm(self.settings.statics.force)) or -FIRST[2]
@@ -219,14 +181,8 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         """Where the arrows of lost directions end that are drawn ``(n, 3)``."""
         return np.zeros((0, 3)) if "singularities" in self._withheld else lost_ends(self.read).round(6)
 
-    def running(self) -> Sequence[Work | Sweep]:
-        found: list[Work | Sweep] = [Sweep(self._move, FRAME)] if self.settings.runs else []
-        if (leaving := self.facts.leaving) is not None:
-            arm = self.stage.now
-            found.append(Work("exits", self.stage.summaries.exits, (arm.robot, leaving, arm.obstacles)))
-        if self.settings.driven is not None:
-            found.append(Sweep(self._drive, FRAME))
-        return found
+    def running(self) -> Sequence[Sweep]:
+        return [Sweep(self._move, FRAME)] if self.settings.runs else []
 
     def _move(self, seconds: float) -> None:
         """A frame of the motion in the null space; another motion of the arm ends it."""
@@ -241,24 +197,6 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         self.change(runs=False, motion=None)
         if made is not None:
             self.stage.notify(made)
-
-    def _drive(self, seconds: float) -> None:
-        """A frame of the way out; another motion of the arm ends it."""
-        made, found = self.settings.driven, self.facts.exits
-        here = made is not None and np.array_equal(made[0][made[1]], self.stage.now.goal)
-        way = exits.driven(found, made[0]) if made is not None and found is not None else None
-        if made is None or found is None or way is None or not here:
-            self.change(driven=None, leaving=None)
-            if here:
-                self.stage.notify(exits.CHANGED)
-            return
-        passed = exits.after(*made, seconds)
-        arrived = passed == len(way.q) - 1
-        self.change(driven=(way.q, passed))
-        notice = exits.left(found, way, self.stage.units) if arrived else exits.DRIVEN
-        self.stage.move_to(way.q[passed], notice, at_once=True)
-        if arrived:
-            self.change(driven=None, leaving=None)
 
     def _push(self, force: Sequence[float]) -> None:
         """Show this force, within the limits."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.viewer.drive import FASTEST
 from app.viewer.lessons.velocity.facts import VelocityFacts
 from app.viewer.lessons.velocity.settings import SPEEDS
 from app.viewer.null_space import hold
 from app.viewer.panel.status import Notice
 from kin.transforms import Array
 
-FRAME = 1 / 30  # s
-FASTEST = 0.5  # rad/s or m/s of the quickest joint of the self-motion
 STILL = 1e-3  # of z in the null space: the goal is as good as it gets
 MOVING = Notice("reached", "Null space", "The joints move; the tool does only what v says.")
 BEST = Notice("reached", "The best place is reached", "z has no part in the null space any more.")

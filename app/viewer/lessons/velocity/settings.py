@@ -61,9 +61,6 @@ class VelocitySettings(Settings):
         start: the configuration ``(n,)`` where the line begins; None: home.
         plot: the plot of the line, as HTML.
         motion: where the motion in the null space has come to: configuration ``(n,)`` and pose ``(4, 4)``.
-        leaving: the configuration ``(n,)`` for which the ways out of a singularity are shown.
-        exit: which of them is drawn.
-        driven: the waypoints ``(k, n)`` of the one that is driven frame by frame, and how many are passed.
     """
 
     frame: Frame = choice("Frame", FRAMES, "base", hint=FRAME_HINT)
@@ -79,6 +76,3 @@ class VelocitySettings(Settings):
     start: Array | None = memory()
     plot: str = memory("")
     motion: tuple[Array, Array] | None = memory()
-    leaving: Array | None = memory()
-    exit: int = memory(0)
-    driven: tuple[Array, int] | None = memory()

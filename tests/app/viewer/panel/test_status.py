@@ -165,3 +165,12 @@ def test_what_has_failed_stands_beside_a_notice_that_all_is_well() -> None:
     status.fail("")
     status.show(READY)
     assert "<b>Ready</b>" in element.content
+
+
+def test_what_can_be_done_stands_below_every_notice_until_it_ends() -> None:
+    status, element = line()
+    status.offer('<button type="button">Step out</button>')
+    status.show(Notice("hand", "Home"))
+    assert '<button type="button">Step out</button>' in element.content
+    status.offer("")
+    assert "Step out" not in element.content
