@@ -33,27 +33,30 @@ def finite_array(field: str, value: ArrayLike, shape: tuple[int | None, ...]) ->
     Raises:
         InputError: naming `field`, for anything that is not numbers of that shape, NaN and infinity included.
     """
-    expected = f"finite numbers of shape (…, {', '.join('any' if s is None else str(s) for s in shape)})"
     try:
         raw = np.asarray(value)
         # numpy silently converts strings of digits and complex numbers: check before converting.
         if raw.dtype.kind not in "biuf":
-            raw = _numbers(field, value, expected)
+            raw = _numbers(field, value, _expected(shape))
         array = np.ascontiguousarray(raw, dtype=np.float64)
         if not is_plain(array):  # numpy keeps an unaligned array, and a data type with metadata
             array = np.array(array, dtype=_FLOAT)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(field, value, expected) from None
+        raise InputError(field, value, _expected(shape)) from None
     tail = array.shape[-len(shape) :] if array.ndim >= len(shape) else ()
     if len(tail) != len(shape) or any(s is not None and s != t for s, t in zip(shape, tail, strict=True)):
-        raise InputError(field, f"shape {array.shape}", expected)
+        raise InputError(field, f"shape {array.shape}", _expected(shape))
     if not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = field + "".join(f"[{i}]" for i in index)
         raise InputError(where, float(array[index]), "a finite number")
     return array
+
+
+def _expected(shape: tuple[int | None, ...]) -> str:
+    return f"finite numbers of shape (…, {', '.join('any' if s is None else str(s) for s in shape)})"
 
 
 def _numbers(field: str, value: ArrayLike, expected: str) -> Array:

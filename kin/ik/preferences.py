@@ -58,7 +58,7 @@ def searches(problem: IKProblem, branches: Branches) -> bool:
     """Whether there may be better values than those that the solver has chosen."""
     if problem.options.prefer != "nearest":
         return True
-    return any(value == value for k in problem.searched for value in branches.values[:, k].tolist())  # not NaN
+    return any(len(branches.arcs[k]) for k in problem.searched)
 
 
 def ranks(problem: IKProblem, q: Array, distance: Array) -> Array:

@@ -136,6 +136,8 @@ def _in_motion(
     robot: Robot, limits: MotionLimits, qd_start: ArrayLike | None, qdd_start: ArrayLike | None
 ) -> InMotion | None:
     """How the arm moves at the start, checked against the limits of its joints; None at rest."""
+    if qd_start is None and qdd_start is None:
+        return None
     found = []
     for field, given, most, per in (
         ("qd_start", qd_start, limits.velocity, "s"),
