@@ -106,7 +106,7 @@ int main(void) {{
 """
     (tmp_path / "main.c").write_text(main)
     checks = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-Wno-missing-braces"]
-    command = ["gcc", "-std=c99", "-O1", "-g", *checks, tmp_path / "main.c", "-o", tmp_path / "main", "-lm"]
+    command = ["gcc", "-std=c99", "-O0", *checks, tmp_path / "main.c", "-o", tmp_path / "main", "-lm"]
     subprocess.run(command, check=True, cwd=tmp_path)
     done = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True)
     assert int(done.stdout) > 0
