@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kin.angles import TURN
-from kin.axes import NEARLY, size
+from kin.axes import NEARLY, screw_x, screw_z, size
 from kin.codegen import wrappers
 from kin.codegen.source import plain
 from kin.codegen.types import Constants
+from kin.differential.metric import extent
 from kin.errors import InputError
 from kin.robot import Robot
 from kin.solvers.collinear7.branches import solve as solve_collinear7
@@ -65,6 +66,12 @@ _ELSE = "Use kin.solve_ik, or the REST service"
 _RIGHT, _SEEN = 0.5 * math.pi, 1e-10
 _ANGLES = ("0", "pi/2 (90°)", "pi (180°)", "-pi/2 (-90°)")
 _TINY = 3e-4  # of the arm's size: such a length counts as rounding, as in kin.solvers.rounded
+
+# Poses close by, one below the other, as in kin.solvers.general6: radians, shares of the reach.
+_ASIDE = np.concatenate([
+    screw_z(1e-3 * a, 1e-3 * b) @ screw_x(1e-3 * c, 1e-3 * d)
+    for a, b, c, d in ((1.0, 0.6, -0.8, 0.9), (-0.7, 0.8, 1.1, -0.5), (0.3, -1.2, 0.9, 0.4))
+])  # fmt: skip
 
 
 class Alone(NamedTuple):
@@ -179,12 +186,12 @@ def of_offset7(
     return count
 
 
-def of_general6(
+def of_elimination(
     inner: Inner, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
 ) -> int:
-    """What the elimination finds."""
-    inner(params, T, q)
-    return 0
+    """What the elimination finds; returns minus what it knows of that."""
+    known: int = inner(params, T, q)
+    return 0 - known
 
 
 def _copy(rows: Array, q: Array) -> None:
@@ -285,11 +292,22 @@ def _general5(form: General5, robot: Robot) -> Alone:
 
 
 def _general6(form: General6, robot: Robot) -> Alone:
+    return _elimination(form, robot).within(
+        wrappers.of_general6,
+        model=np.asarray(form.robot.model),
+        turns=form.robot.revolute.astype(np.float64),
+        size=size(form.robot),
+        reach=extent(form.robot),
+        steps=_ASIDE,
+    )
+
+
+def _elimination(form: General6, robot: Robot) -> Alone:
     kernels, reading = form.kernels, form.reading
     kernels = kernels.form if isinstance(kernels, WrappedKernels) else kernels
     if plain(kernels.one) is not plain(general6_batch.branches_one):
         raise needs_python(robot, form)
-    found = Alone(of_general6, general6_batch.solve_all, np.asarray(kernels.params))
+    found = Alone(of_elimination, general6_batch.solve_all, np.asarray(kernels.params))
     if reading.is_itself:
         return found
     return found.within(wrappers.of_order, order=np.array(reading.order), inverted=reading.inverted)
@@ -297,9 +315,8 @@ def _general6(form: General6, robot: Robot) -> Alone:
 
 def _general7(form: General7, robot: Robot) -> Alone:
     fold = form.fold
-    found = alone(robot, form.form).within(
-        wrappers.of_general7, joint=fold.joint, last=fold.last, axis=fold.axis, back=fold.back
-    )
+    inner = _elimination(form.form, robot) if isinstance(form.form, General6) else alone(robot, form.form)
+    found = inner.within(wrappers.of_general7, joint=fold.joint, last=fold.last, axis=fold.axis, back=fold.back)
     return found._replace(stepped=True)
 
 

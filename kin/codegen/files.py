@@ -226,7 +226,7 @@ def _not_promised(arm: Arm) -> Iterable[str]:
         yield "With fewer than six joints, a pose rounded beyond 1e-9 is approximate at best: only Kinboard"
         yield "widens its tolerances."
     if arm.form.name == "general6":
-        yield "Nor that the list is complete: Kinboard also asks targets close by, which takes Python."
+        yield "Nor that the list is complete: beside singular configurations Kinboard searches on, in Python."
     if arm.parameter is not None:
         yield "Nor all configurations, of which there is a continuum: each is one of its branch, at one value of"
         label = _ascii(arm.parameter.label)

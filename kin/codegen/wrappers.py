@@ -12,14 +12,21 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.codegen.types import Constants
+from kin.kernels.dense import least_pivot
 from kin.kernels.fk import fk_into
+from kin.kernels.jacobian import jacobian_one
 from kin.solvers.common import UNBOUNDED
+from kin.solvers.contract import POSE
 from kin.solvers.coupled import APART
+from kin.solvers.general6.batch import PROVED
+from kin.solvers.numeric import each_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Limits = tuple[Array, Array]  # lower and upper
 _AT_ZERO = TOLERANCES.near_miss
+# As in `kin.solvers.general6`: the error of a solution, how far apart two are; the pivot of a regular one.
+_MET, _SAME, _REGULAR = 1e-10, 1e-6, 1e-4
 
 
 def of_counted(
@@ -64,6 +71,64 @@ def of_order(
         for i in range(q.shape[0]):
             q[i, column] = rows[i, j]
     return count
+
+
+def of_general6(
+    other: Constants, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
+) -> int:
+    """What the elimination finds, and unless that is proved to be all, what targets close by lead to.
+
+    As `General6.add_missing`, without what takes singular values: of singular configurations there may be more.
+    """
+    known: int = other.rows(other.inner, params, T, value, near, limits, arcs, q)
+    if known == 0 - PROVED:
+        return 0
+    size, step, pose, J = q.shape[0], np.empty((4, 4)), np.empty((4, 4)), np.empty((6, 6))
+    rows, costs, mask, turns = np.empty((size, 6)), np.empty(size), np.zeros(7), np.zeros(6)
+    low, high = np.full(6, -UNBOUNDED), np.full(6, UNBOUNDED)
+    count = _counted(q)
+    for k in range(3):
+        for i in range(4):
+            for j in range(4):
+                step[i, j] = other.steps[4 * k + i, j]
+        _product(T, step, pose)
+        for i in range(3):
+            pose[i, 3] = T[i, 3] + other.reach * step[i, 3]
+        other.rows(other.inner, params, pose, value, near, limits, arcs, rows)
+        found = _counted(rows)
+        each_of(other.model, (T, POSE, mask, 1.0), (low, high, turns), -1.0, found + 1, rows[:found], costs)
+        for i in range(found):
+            if costs[i] < _MET and count < size:
+                jacobian_one(other.model, rows[i], J)
+                for r in range(3):
+                    for j in range(6):
+                        J[r, j] = J[r, j] / other.size
+                if least_pivot(J) > _REGULAR and _is_new(rows[i], q, count, other.turns):
+                    for j in range(6):
+                        q[count, j] = wrap(rows[i, j]) if other.turns[j] != 0.0 else rows[i, j]
+                    count += 1
+    return 0
+
+
+def _counted(rows: Array) -> int:
+    """How many rows there are before those of NaN."""
+    count = 0
+    for i in range(rows.shape[0]):
+        if not math.isnan(rows[i, 0]):
+            count += 1
+    return count
+
+
+def _is_new(row: Array, q: Array, count: int, turns: Array) -> bool:
+    """Whether none of the first rows of q is this one, but for whole turns."""
+    for i in range(count):
+        apart = 0.0
+        for j in range(row.shape[0]):
+            off = row[j] - q[i, j]
+            apart = max(apart, abs(wrap(off) if turns[j] != 0.0 else off))
+        if apart < _SAME:
+            return False
+    return True
 
 
 def of_general7(

@@ -362,7 +362,9 @@
       const range = Number.isFinite(high - low) ? ` from ${withUnit(low, turns)} to ${withUnit(high, turns)}` : "";
       const point = field.value.includes(",") ? ", with a point for decimals" : "";
       error.textContent = wrong ? `A number${range}${point}.` : "";
-      if (!wrong) set(clamp(typed, low, high));
+      if (wrong) return;
+      set(clamp(typed, low, high));
+      field.value = written(value(), turns);
     });
     field.addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;
@@ -531,6 +533,7 @@
     state.found = found;
     state.q = (found.closest ?? found.rows[0]).q;
     show();
+    if (free) showFree();
   }
 
   // In the order of the branches, whichever is nearest.
@@ -539,7 +542,9 @@
     return solver && !state.saved ? [] : data.target?.postures ?? [];
   }
   const isShown = ({ q }) => q.every((value, i) => Math.abs(value - state.q[i]) < 1e-6);
-  const nameOf = (row) => row.name ?? data.solver.branches[row.row]?.[1] ?? "found by search";
+  // Lines break between the parts of a name.
+  const nameOf = (row) => (row.name ?? data.solver.branches[row.row]?.[1] ?? "found by search")
+    .replace(/ (?=[+\u2212])/g, "\u00a0").replace(/-/g, "\u2011");
   const reason = () => {
     if (state.saved || !solver) return data.target?.reason ?? "";
     return state.found ? words.text(state.found) || "No configuration meets this target." : "";
@@ -640,7 +645,9 @@
 
   function showValue() {
     const row = postures()[state.chosen];
+    const { joint } = data.solver.parameter;
     if (row) free.slider.value = state.value ?? solver.valueAt(state.target, row);
+    else if (joint >= 0) free.slider.value = state.q[joint];
     free.slider.setAttribute("aria-valuetext", withUnit(Number(free.slider.value), true));
     free.refresh();
   }

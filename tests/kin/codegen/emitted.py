@@ -156,7 +156,7 @@ def answer(arm: Arm, T, seed, value):
     pose, q, alone = np.empty((4, 4)), np.empty((arm.rows, robot.n)), arm.alone
     assert straighten(np.ascontiguousarray(T), 1e6, pose) >= 0.0
     rows = alone.inner.rows if alone.rows is wrappers.of_counted else alone.rows
-    if rows in (families.without_limits, families.of_general6):
+    if rows in (families.without_limits, families.of_elimination):
         form.kernels.one(form.kernels.params, pose, value, seed, q)
     elif isinstance(alone.inner, Constants) and rows is alone.rows:  # Python computes sums of products otherwise
         limits, arcs = (robot.lower, robot.upper), np.empty((256, 3))

@@ -12,7 +12,7 @@ from arms import ONE_OF_EACH_SOLVER
 from emitted import ROBOTS, STRICT, answer, exact, targets
 from numba import types
 
-from kin import builtin_robots
+from kin import builtin_robots, fk, solve_ik
 from kin.codegen import files
 from kin.codegen.arm import arm_of
 from kin.codegen.families import alone, without_limits
@@ -73,6 +73,21 @@ def test_an_adapter_finds_what_the_solver_finds(robot_id):
             off = np.where(robot.revolute, (off + math.pi) % (2.0 * math.pi) - math.pi, off)
             assert len(q) == len(expected)
             assert np.abs(off).max(axis=2).min(axis=0).max() < 1e-7
+
+
+def test_targets_close_by_lead_to_what_the_elimination_misses():
+    robot = builtin_robots()["crx10ia"]  # at home several solutions share the angle that is eliminated for
+    found, seed, counts = alone(robot, closed_form_of(robot)), robot.q_home, []
+    limits, arcs, elimination = (robot.lower, robot.upper), np.empty((256, 3)), found.inner
+    for each in (elimination, found):
+        q = np.empty((16, 6))
+        each.rows(each.inner, found.params, fk(robot, seed), math.nan, seed, limits, arcs, q)
+        counts.append(int((~np.isnan(q[:, 0])).sum()))
+    assert np.abs(fk(robot, q[: counts[1]]) - fk(robot, seed)).max() < 1e-9
+    expected = np.array([solution.q for solution in solve_ik(robot, fk(robot, seed), q_seed=seed).solutions])
+    assert counts[0] < len(expected) <= counts[1]
+    off = (q[: counts[1], None] - expected + math.pi) % (2.0 * math.pi) - math.pi
+    assert np.abs(off).max(axis=2).min(axis=0).max() < 1e-7
 
 
 @pytest.mark.full
