@@ -138,7 +138,7 @@ def _as_typed(error: InputError, given: Read | None, fixture: TouchFixture) -> I
     if where is not None:
         what = where[1] if where[2] is None else f"socket {int(where[2]) + 1}{where[3]}"
         return InputError("--place, --table", what, error.expected)
-    if option := {"wave": "--waves", "count": "--plan"}.get(error.field):
+    if option := {"wave": "--waves", "count": "--plan", "q": "TOUCHES"}.get(error.field):
         return error.renamed(option)
     match = re.fullmatch(r"(q|done\[0\]|sockets|done\[1\])\[(\d+)\](?:\[(\d+)\])?", error.field)
     if match is None or given is None:

@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 
 from kin import Robot, builtin_robots
 from kin.calibration import Calibration, TableError, TouchBoard
 from kin.calibration.fixtures import PAPER
-from kin.calibration.words import degrees, millimetres, name_of
-from kin.units import fixed
+from kin.calibration.words import millimetres, remarks
 
 SOURCE = "Calibrated by touching. Nominal table: "
 LONGEST_SOURCE = 4000  # characters that robot files may have there
 _ARM, _LINE = 6.0, 100.0  # mm: of a cross, of the line to measure
 _STYLE = (
-    "body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#1b1f24}"
-    "table{border-collapse:collapse;width:100%;font-size:14px}td,th{padding:2px 8px;text-align:left;"
-    "border-bottom:1px solid #d6dae0}td.n{text-align:right;font-variant-numeric:tabular-nums}"
-    "tr.out td,tr.unseen td{color:#6a727c}svg{display:block}"
+    ":root{--ink:#1b1f24;--soft:#5c6570;--line:#d6dae0;--paper:#fff;--mark:#2166ac;--bad:#b3261e;"
+    "color-scheme:light dark}"
+    "@media(prefers-color-scheme:dark){"
+    ":root{--ink:#e8edf2;--soft:#a3afbb;--line:#39434e;--paper:#191f26;--mark:#6cb0ea;--bad:#ff8a80}}"
+    "body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:var(--ink);"
+    "background:var(--paper)}table{border-collapse:collapse;width:100%;font-size:14px}"
+    "td,th{padding:2px 8px 2px 0;text-align:left;border-bottom:1px solid var(--line)}"
+    "td.n{text-align:right;white-space:nowrap}small{display:block;color:var(--soft)}"
+    ".bad,.out small{color:var(--bad)}.unseen{color:var(--soft)}.bar{width:40%}"
+    ".bar div{position:relative;height:10px}.bar i,.bar b{position:absolute;background:var(--mark)}"
+    ".bar i{height:100%}.out i{background:var(--bad)}.bar b{top:4px;height:2px}"
+    ".zero{background:linear-gradient(var(--soft),var(--soft)) 50%/1px 100% no-repeat}"
+    ".zero i{width:6px;height:6px;top:2px;margin-left:-3px;border-radius:3px}"
 )
-_WIDE, _ROW = 300.0, 14.0  # px of a bar chart
 
 
 def as_own(robot: Robot) -> Robot:
@@ -77,13 +84,14 @@ def report(found: Calibration, sockets: Sequence[int]) -> str:
         ("touches that the fit did not use, table found", found.held_out[1]),
     ]
     rows = "".join(
-        f'<tr><td>{what}</td><td class="n">{millimetres(value)}</td></tr>'
-        for what, value in facts
-        if not math.isnan(value)
+        f"<tr><td>{what}<td class=n>{millimetres(value)}" for what, value in facts if not math.isnan(value)
     )
+    first, *rest = map(escape, remarks(found, len(sockets)))
+    faults = "".join(f"<li class=bad>{escape(fault.text)}" for fault in found.faults)
     return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Calibration of {name}</title>'
-        f"<style>{_STYLE}</style><h1>Calibration of {name}</h1><p>{escape(found.text)}</p>"
+        '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+        f"<title>Calibration of {name}</title><style>{_STYLE}</style><h1>Calibration of {name}</h1>"
+        f"<p><strong>{first}</strong></p><ul>{faults}</ul><p>{' '.join(rest)}</p>"
         f"<h2>Error of the tip</h2><table>{rows}</table>"
         f"<h2>Touches</h2>{_touches(found, sockets)}<h2>Errors of the table</h2>{_errors(found)}</html>\n"
     )
@@ -96,16 +104,14 @@ def _touches(found: Calibration, sockets: Sequence[int]) -> str:
     rows = []
     for k, (miss, socket) in enumerate(zip(misses, sockets, strict=True)):
         out = k not in kept
-        length = min(miss / most, 1.0) * _WIDE
-        colour = "#b3261e" if out else "#2166ac"
+        note = f"<small>left out{', its bar is cut' if miss > most else ''}</small>" if out else ""
         rows.append(
-            f'<tr{" class=out" if out else ""}><td class="n">{k + 1}</td>'
-            f"<td>{'plane' if socket < 0 else f'socket {socket + 1}'}</td>"
-            f'<td><svg width="{_WIDE:g}" height="{_ROW:g}">'
-            f'<rect y="3" width="{length:.1f}" height="8" fill="{colour}"/></svg></td>'
-            f'<td class="n">{millimetres(miss)}</td><td>{"left out" if out else ""}</td></tr>'
+            f"<tr{' class=out' if out else ''}><td>{k + 1}"
+            f"<td>{'plane' if socket < 0 else f'socket {socket + 1}'}{note}"
+            f'<td class=bar><div><i style="width:{100.0 * min(miss / most, 1.0):.1f}%"></i></div>'
+            f"<td class=n>{millimetres(miss)}"
         )
-    return f"<table><tr><th>touch<th>of<th>off by<th><th>{''.join(rows)}</table>"
+    return f"<table><tr><th>touch<th>of<th>off by<th>{''.join(rows)}</table>"
 
 
 def _errors(found: Calibration) -> str:
@@ -115,34 +121,17 @@ def _errors(found: Calibration) -> str:
         largest[_unit(error)] = max(largest.get(_unit(error), 0.0), abs(error.value) + error.interval)
     rows = []
     for error in found.errors:
-        scale = 0.5 * _WIDE / (largest[_unit(error)] or 1.0)
-        middle = 0.5 * _WIDE + scale * error.value
-        half = scale * error.interval
-        drawn = (
-            f'<svg width="{_WIDE:g}" height="{_ROW:g}"><path d="M{0.5 * _WIDE:g} 0v{_ROW:g}" stroke="#c3c9d1"/>'
-            f'<path d="M{middle - half:.1f} 7h{2 * half:.1f}" stroke="#2166ac" stroke-width="2"/>'
-            f'<circle cx="{middle:.1f}" cy="7" r="3" fill="#2166ac"/></svg>'
-        )
-        write = _WRITERS[_unit(error)]
-        reason = {"alike": "others move the tip alike", "hidden": "touches hardly depend on it"}.get(
-            error.unseen, ""
-        )
+        scale = 50.0 / (largest[_unit(error)] or 1.0)
+        middle, half = 50.0 + scale * error.value, scale * error.interval
         rows.append(
-            f"<tr{'' if error.seen else ' class=unseen'}><td>{escape(name_of(error))}</td><td>{drawn}</td>"
-            f'<td class="n">{write(error.value)}</td><td class="n">± {write(error.interval)}</td>'
-            f"<td>{reason or ('in the offset of the motor' if error.in_motor else '')}</td></tr>"
+            f"<tr{'' if error.seen else ' class=unseen'}><td>{escape(error.text)}"
+            f'<td class=bar><div class=zero><b style="left:{middle - half:.1f}%;width:{2.0 * half:.1f}%"></b>'
+            f'<i style="left:{middle:.1f}%"></i></div>'
         )
-    return f"<table><tr><th>of<th>95 % interval<th><th><th>{''.join(rows)}</table>"
+    return f"<table><tr><th>error<th>95 % interval{''.join(rows)}</table>"
 
 
 def _unit(error: TableError) -> str:
     if error.kind == "scale":
         return "%"
     return "mm" if error.kind == "tip" or error.field in ("d", "a") else "°"
-
-
-_WRITERS: dict[str, Callable[[float], str]] = {
-    "mm": millimetres,
-    "°": degrees,
-    "%": lambda share: f"{fixed(100.0 * share, 2)} %",
-}

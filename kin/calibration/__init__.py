@@ -26,7 +26,7 @@ from kin.calibration.chain import Mask, Parameter
 from kin.calibration.faults import Checked, Fault, checked
 from kin.calibration.fit import Fit, Touches, freedom_of, solve, spread
 from kin.calibration.fixtures import PLANE, TouchBoard, TouchFixture
-from kin.calibration.model import Model, TableTolerances, TouchNoise, tip_modes
+from kin.calibration.model import Model, TableTolerances, TouchNoise, fewest, suited, tip_modes
 from kin.calibration.postures import (
     Pieces,
     Scene,
@@ -233,11 +233,11 @@ def _checked_touches(model: Model, q: ArrayLike, sockets: ArrayLike) -> Touches:
         InputError: naming the touch, the value and what is valid.
     """
     touches, n = _readings(model, q, sockets, ("q", "sockets")), model.robot.n
-    if len(touches) <= n:
+    if len(touches) < fewest(model.robot):
         why = f"each gives three numbers, and about {4 * n - 3} numbers of the table can be seen"
-        raise InputError("q", f"shape {touches.q.shape}", f"{n + 1} to {MOST_TOUCHES} touches ({why}): (k, {n})")
+        raise InputError("q", len(touches), f"{fewest(model.robot)} to {MOST_TOUCHES} touches: {why}")
     if float(np.ptp(touches.q, axis=0).max()) < _ONE_POSTURE:
-        raise InputError("q", "touches in one posture", "postures that differ by 5° in some joint or more")
+        raise InputError("q", "all in one posture", "postures that differ by 5° in some joint or more")
     return touches
 
 
@@ -395,9 +395,8 @@ def _advice(model: Model, expected: ExpectedError, count: int) -> str:
     ):
         return ""
     robot = model.robot
-    small = robot.reach < 0.7
-    bar = TouchBoard.bar(0.05 if small else 0.15)
-    sheet = "A4" if small else "A3"
+    length, sheet = suited(robot)
+    bar = TouchBoard.bar(length)
     others = {
         f"a bar of two sockets at three places, one of them raised ({millimetres(2 * bar.spread)})": TouchFixture(
             [bar] * 3

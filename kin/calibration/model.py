@@ -35,6 +35,16 @@ _MOST = {
 }
 
 
+def fewest(robot: Robot) -> int:
+    """How many touches it takes to say something of a table: of what fewer say, most is where the fixture lies."""
+    return robot.n + 1
+
+
+def suited(robot: Robot) -> tuple[float, str]:
+    """The length of a bar in metres, and the paper of a sheet, that suit the size of an arm."""
+    return (0.05, "A4") if robot.reach < 0.7 else (0.15, "A3")
+
+
 @dataclass(frozen=True)
 class TableTolerances:
     """Largest errors that are expected of a table. The fit takes them to be up to three times as large.

@@ -143,28 +143,32 @@ def candidates(scene: Scene, seed: int = 0, cancel: Callable[[], None] = never_c
     count = max(_FEWEST, _CANDIDATES // (len(scene.sockets) + scene.fixture.plane))
     rng = np.random.default_rng(seed)
     q, at = [], []
-    for j in range(len(scene.sockets)):
+    for j, spot in enumerate(scene.sockets):
         cancel()
+        board = int(scene.fixture.owner[j])
+        up, cone = scene.poses[board, :3, 2], scene.fixture.boards[board].cone
         if scene.robot.n < 6 or scene.robot.coupled:
-            found = _by_projection(scene, j, count, rng)
+            found = _by_projection(scene, lambda p, spot=spot: spot - p, up, cone, count, rng)  # type: ignore[misc]
         else:
-            found = _by_inverse_kinematics(scene, j, count, rng)
+            found = _by_inverse_kinematics(scene, spot, up, cone, count, rng)
         q.append(found)
         at += [j] * len(found)
-    if scene.fixture.plane:
-        found = _on_plane(scene, count, rng)
+    if scene.fixture.plane:  # anywhere within reach
+        up, cone = np.array([0.0, 0.0, 1.0]), scene.fixture.boards[0].cone
+        found = _by_projection(scene, lambda p: (scene.table - p)[:, 2:], up, cone, count, rng)
         q.append(found)
         at += [PLANE] * len(found)
     return Touches(np.vstack(q), np.array(at, np.int64))
 
 
-def _by_inverse_kinematics(scene: Scene, socket: int, count: int, rng: np.random.Generator) -> Array:
+def _by_inverse_kinematics(
+    scene: Scene, spot: Array, up: Array, cone: float, count: int, rng: np.random.Generator
+) -> Array:
     """Every posture for random directions of the tool within the cone, and random rolls."""
-    robot, board = scene.robot, int(scene.fixture.owner[socket])
-    up, cone = scene.poses[board, :3, 2], scene.fixture.boards[board].cone
+    robot = scene.robot
     found: list[Array] = []
     T = np.eye(4)
-    T[:3, 3] = scene.sockets[socket]
+    T[:3, 3] = spot
     for _ in range(_TRIES):
         T[:3, :3] = _frame(up, cone, rng)
         answer = solve_ik(robot, T, q_seed=robot.random_q(rng) if robot.n > 6 else None)
@@ -177,32 +181,21 @@ def _by_inverse_kinematics(scene: Scene, socket: int, count: int, rng: np.random
     return np.asarray(q[rng.permutation(len(q))[:count]])
 
 
-def _by_projection(scene: Scene, socket: int, count: int, rng: np.random.Generator) -> Array:
-    """Random configurations, moved onto the socket by Newton steps."""
-    robot, board, goal = scene.robot, int(scene.fixture.owner[socket]), scene.sockets[socket]
-    up, cone = scene.poses[board, :3, 2], scene.fixture.boards[board].cone
-    kept = np.empty((0, robot.n))
-    for _ in range(_ROUNDS):
-        q = _onto(robot, robot.random_q(rng, _PROJECTED), lambda p: goal - p)
-        T = fk(robot, q)
-        good = (np.linalg.norm(T[:, :3, 3] - goal, axis=1) < 1e-8) & robot.in_limits(q)
-        good &= -(T[:, :3, 2] @ up) > math.cos(cone)
-        q = q[good]
-        kept = np.vstack([kept, q[scene.free(q)]])
-        if len(kept) >= count:
-            break
-    return kept[:count]
-
-
-def _on_plane(scene: Scene, count: int, rng: np.random.Generator) -> Array:
-    """Configurations whose tip is on the table, anywhere within reach; the links stay above it."""
+def _by_projection(
+    scene: Scene,
+    missing: Callable[[Array], Array],
+    up: Array,
+    cone: float,
+    count: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Random configurations, moved by Newton steps until `missing` of their tips is 0, as `_onto` has it."""
     robot, kept = scene.robot, np.empty((0, scene.robot.n))
-    cone = scene.fixture.boards[0].cone
     for _ in range(_ROUNDS):
-        q = _onto(robot, robot.random_q(rng, _PROJECTED), lambda p: (scene.table - p)[:, 2:])
+        q = _onto(robot, robot.random_q(rng, _PROJECTED), missing)
         T = fk(robot, q)
-        good = (np.abs(T[:, 2, 3] - scene.table) < 1e-8) & robot.in_limits(q) & (-T[:, 2, 2] > math.cos(cone))
-        q = q[good]
+        good = (np.linalg.norm(missing(T[:, :3, 3]), axis=1) < 1e-8) & robot.in_limits(q)
+        q = q[good & (-(T[:, :3, 2] @ up) > math.cos(cone))]
         kept = np.vstack([kept, q[scene.free(q)]])
         if len(kept) >= count:
             break

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from kin.calibration.results import Calibration, ExpectedError, TableError, TouchFault
+from kin.ik.messages.values import listed
 from kin.units import fixed
 
 _FIELDS = {
@@ -29,11 +29,6 @@ def millimetres(metres: float) -> str:
 def degrees(radians: float) -> str:
     """A small angle."""
     return f"{fixed(math.degrees(radians), 2)}°"
-
-
-def listed(words: Sequence[str]) -> str:
-    """Words with commas and "and"."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def name_of(error: TableError) -> str:
@@ -66,7 +61,7 @@ def error_text(error: TableError) -> str:
 def fault_text(fault: TouchFault, socket: int) -> str:
     """A mistake, and what was done about it; `socket` is what was to be touched."""
     who = "In all touches" if fault.touch is None else f"In touch {fault.touch + 1}"
-    joints = listed(fault.joints)
+    joints = listed(fault.joints) if fault.joints else ""
     done = "It was left out."
     if fault.in_motors:
         done = "The motors of the arm found make up for it."

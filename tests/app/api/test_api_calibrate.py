@@ -64,36 +64,37 @@ def test_further_postures_take_account_of_touches(client: TestClient, plan: dict
 
 
 @pytest.mark.parametrize(
-    ("change", "status", "field"),
+    ("change", "field", "said"),
     [
-        ({"fixture": {"boards": []}}, 422, "fixture.boards"),
-        ({"fixture": {"boards": [{}] * 17}}, 422, "fixture.boards"),
-        ({"fixture": {"boards": [{"sheet": "B5"}]}}, 422, "fixture.boards[0].sheet"),
-        ({"fixture": {"boards": [{}, {"sockets": [[0, 0, 0], [0, 0, 0]]}]}}, 422, "fixture.boards[1].sockets[1]"),
-        ({"fixture": {"boards": [{"sockets": [[0, 0, 0]] * 65}]}}, 422, "fixture.boards[0].sockets"),
-        ({"fixture": {"boards": [{}], "at_base": []}}, 422, "fixture.at_base"),
-        ({"fixture": {"boards": [{}], "at_base": [[[1e9] * 4] * 4]}}, 422, "fixture.at_base[0][0][0]"),
-        ({"fixture": {"boards": [{}], "at_base": [[[2.0] * 4] * 4]}}, 422, "fixture.at_base[0][3]"),
-        ({"tolerances": {"zero": 9.0}}, 422, "tolerances.zero"),
-        ({"noise": {"joint": 0.7, "contact": 1e-4}}, 422, "noise.joint"),
-        ({"q": [[0.0] * 6] * 1001, "sockets": [0] * 1001}, 422, "q"),
-        ({"q": [[0.0] * 5] * 8}, 422, "q[0]"),
-        ({"q": [[9.0] * 6] * 8}, 422, "q[0][0]"),
-        ({"q": [[0.1] * 6] * 8}, 422, "q"),
-        ({"q": [[0.1] * 6] * 3, "sockets": [0] * 3}, 422, "q"),
-        ({"sockets": [0] * 7}, 422, "sockets"),
-        ({"sockets": [0] * 7 + [2]}, 422, "sockets[7]"),
-        ({"sockets": [0] * 7 + [True]}, 422, "sockets[7]"),
-        ({"sockets": [0] * 7 + [0.5]}, 422, "sockets[7]"),
+        ({"fixture": {"boards": []}}, "fixture.boards", ""),
+        ({"fixture": {"boards": [{}] * 17}}, "fixture.boards", ""),
+        ({"fixture": {"boards": [{"sheet": "B5"}]}}, "fixture.boards[0].sheet", ""),
+        ({"fixture": {"boards": [{}, {"sockets": [[0, 0, 0], [0, 0, 0]]}]}}, "fixture.boards[1].sockets[1]", ""),
+        ({"fixture": {"boards": [{"sockets": [[0, 0, 0]] * 65}]}}, "fixture.boards[0].sockets", ""),
+        ({"fixture": {"boards": [{}], "at_base": []}}, "fixture.at_base", ""),
+        ({"fixture": {"boards": [{}], "at_base": [[[1e9] * 4] * 4]}}, "fixture.at_base[0][0][0]", ""),
+        ({"fixture": {"boards": [{}], "at_base": [[[2.0] * 4] * 4]}}, "fixture.at_base[0][3]", ""),
+        ({"tolerances": {"zero": 9.0}}, "tolerances.zero", ""),
+        ({"noise": {"joint": 0.7, "contact": 1e-4}}, "noise.joint", ""),
+        ({"q": [[0.0] * 6] * 1001, "sockets": [0] * 1001}, "q", ""),
+        ({"q": [[0.0] * 5] * 8}, "q[0]", ""),
+        ({"q": [[9.0] * 6] * 8}, "q[0][0]", "are these degrees"),
+        ({"q": [[0.1] * 6] * 8}, "q", "differ by 5°"),
+        ({"q": [[0.1] * 6] * 3, "sockets": [0] * 3}, "q", "7 to 1000 touches"),
+        ({"sockets": [0] * 7}, "sockets", ""),
+        ({"sockets": [0] * 7 + [2]}, "sockets[7]", "a socket of the fixture, 0 to 1"),
+        ({"sockets": [0] * 7 + [True]}, "sockets[7]", ""),
+        ({"sockets": [0] * 7 + [0.5]}, "sockets[7]", ""),
     ],
     ids=str,
 )
 def test_bad_input_names_the_field(
-    client: TestClient, plan: dict[str, Any], change: dict[str, Any], status: int, field: str
+    client: TestClient, plan: dict[str, Any], change: dict[str, Any], field: str, said: str
 ) -> None:
     body = {"fixture": BAR, "q": plan["q"], "sockets": plan["sockets"], **change}
-    found = asked(client, "robots/ur5e/calibrate", body, status)
+    found = asked(client, "robots/ur5e/calibrate", body, 422)
     assert found["errors"][0]["field"] == field, found
+    assert said in found["errors"][0]["expected"]
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_a_fit_is_printed_and_written(touches: Path, tmp_path: Path, capsys) -> 
     q = found.random_q(np.random.default_rng(1), 20)
     assert np.abs(kin.fk_positions(found, q) - kin.fk_positions("ur5e", q)).max() < 1e-5
     html = page.read_text(encoding="utf-8")
-    assert html.count("<svg") > 30
+    assert html.count("class=bar") > 30
     assert "http" not in html
     assert main([*words[:5], "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -121,6 +121,33 @@ def test_what_is_wrong_is_said_with_its_line(
     for more in ([], ["--plan", "3"]):
         assert main(["calibrate", "ur5e", str(file), "--bar", "150", *more]) == 2
         assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda rows: rows[:6],
+            "TOUCHES: got 6, expected 7 to 1000 touches: each gives three numbers, and about",
+        ),
+        (
+            lambda rows: np.column_stack([rows[:, 0], np.tile(rows[0, 1:], (10, 1))]),
+            "TOUCHES: got 'all in one posture', expected postures that differ by 5°",
+        ),
+        (
+            lambda rows: np.column_stack([rows[:, 0], np.degrees(rows[:, 1:])]),
+            "within its limits, -6.283 to 6.283; are these degrees? Joint values are radians",
+        ),
+        (lambda rows: np.roll(rows, -1, axis=1), "TOUCHES line 1, socket: got"),
+    ],
+    ids=["few", "one posture", "degrees", "columns exchanged"],
+)
+def test_what_is_wrong_with_all_touches_is_said(touches: Path, tmp_path: Path, capsys, change, said) -> None:
+    rows = change(np.loadtxt(touches, delimiter=",", skiprows=1))
+    file = tmp_path / "bad.csv"
+    file.write_text("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()))
+    assert main(["calibrate", "ur5e", str(file), "--bar", "150"]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_options_that_do_not_fit_are_refused(capsys, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 SO101 = kin.get_robot("so101")
 SHEET = TouchFixture([TouchBoard.sheet("A4")])
-COUNT, BAD, TYPED = 14, 3, 5
+COUNT, BAD, TYPED = 14, 3, {5: "Take", 7: "Next"}  # by what typed values are taken
 PROGRAM = re.compile(r'^import kin\n+page = kin\.connect\("(\S+)",\s"(\S+)"\)$', re.MULTILINE)
 
 
@@ -35,13 +35,28 @@ def simulated() -> np.ndarray:
     return found.q
 
 
-def take(tab: Tab, at: int, q: np.ndarray) -> None:
-    """Type what the joints read, letter by letter, and take it."""
+# The letters of a text and a press, within one task of the page.
+TYPE_AND_PRESS = """async ([input, text, button]) => {
+  const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  for (let end = 1; end <= text.length; end++) {
+    setValue.call(input, text.slice(0, end));
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+    for (let k = 0; k < 20; k++) await null; // React draws
+  }
+  button.click();
+}"""
+
+
+def take(tab: Tab, at: int, q: np.ndarray, button: str) -> None:
+    """Type what the joints read, letter by letter, and take it with the last letter."""
     page, text = tab.page, " ".join(f"{value:.2f}" for value in np.degrees(q))
-    field = tab.row("Joint values").get_by_role("textbox")
-    field.press_sequentially(text)
-    expect(field).to_have_value(text)
-    page.get_by_role("button", name="Take", exact=True).click()
+    field = tab.row("Joint values").get_by_role("textbox").element_handle()
+    press = page.get_by_role("button", name=button, exact=True)
+    page.evaluate(TYPE_AND_PRESS, [field, text, press.element_handle()])
+    if button == "Next":
+        expect(page.locator(f'[data-calibrate-posture="{at + 2}"]')).to_be_visible()
+        expect(tab.row("Joint values").get_by_role("textbox")).to_have_value("")
+        page.get_by_role("button", name="Back", exact=True).click()
     cells = page.get_by_role("table", name=f"Posture {at + 1} of {COUNT}").get_by_role("cell")
     expect(cells.last).to_have_text(Units().angles.text(q[-1], 2))
 
@@ -88,8 +103,8 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
             if i in (1, 9):
                 shown.evaluate("block => block.scrollIntoView()")  # at once: its numbers are written anew
                 tab.screenshot(f"calibrate-{size}-posture-{i + 1}")
-            if i == TYPED:
-                take(tab, i, q)
+            if i in TYPED:
+                take(tab, i, q, TYPED[i])
             else:
                 page.get_by_role("button", name="Read", exact=True).click()
             expect(table.get_by_role("row")).to_have_count(i + 2)
@@ -106,7 +121,7 @@ def test_touches_of_a_connected_arm_give_the_arm_of_the_page(request: pytest.Fix
     tab.screenshot(f"calibrate-{size}-touches")
     found.scroll_into_view_if_needed()
     tab.screenshot(f"calibrate-{size}-found")
-    page.wait_for_timeout(2500)  # the page stores what is done once nothing has been done for a moment
+    page.wait_for_timeout(1500)  # the page stores what is done within a second
     page.reload()
     tab.open("Robot")
     folder.click()

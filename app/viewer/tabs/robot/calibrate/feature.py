@@ -25,10 +25,10 @@ from app.viewer.skeleton import ghost
 from app.viewer.tabs.robot.calibrate import views
 from app.viewer.tabs.robot.calibrate.run import (
     BOARDS,
+    COUNT,
     LENGTHS,
     MORE,
     MOST,
-    SMALL,
     Found,
     Run,
     Touch,
@@ -36,11 +36,14 @@ from app.viewer.tabs.robot.calibrate.run import (
     from_json,
     planned,
     read_joints,
+    readable,
     solved,
     to_json,
 )
+from app.viewer.views.templates import render
 from kin import KinematicsError, Robot
 from kin.calibration.fixtures import PAPER
+from kin.calibration.model import fewest, suited
 from kin.warmup import COLLISIONS
 
 LOOK_AGAIN = 0.2  # s between two looks at the connected arm, and at what is computed
@@ -49,11 +52,8 @@ OPACITY, CROSS, THIN, THICK = 0.6, 0.012, 0.001, 0.003
 KINDS = {"crosses of a printed sheet": "sheet", "two sockets of a bar": "bar", "one pin": "pin"}
 KIND_HINT = "A sheet suits small arms of five joints, a bar or a pin those of six and seven"
 PLACES_HINT = "Several places show more; each is touched several times"
+COUNT_HINT = "One more than the arm has joints, or more: fewer say nothing of its table"
 JOINTS_HINT = "Numbers with spaces between them, from the base to the tool, in the units of the page"
-
-
-def _is_small(robot: Robot) -> bool:
-    return robot.reach < SMALL
 
 
 @dataclass(frozen=True)
@@ -68,13 +68,18 @@ class CalibrateSettings(Settings):
     """
 
     kind: str = choice("Touch", KINDS, "sheet", hint=KIND_HINT)
-    paper: str = choice("Paper", {name: name for name in PAPER}, lambda robot: "A4" if _is_small(robot) else "A3")
-    length: float = number(
-        "Distance of the sockets", lambda robot: 0.05 if _is_small(robot) else 0.15, LENGTHS, "length"
-    )
+    paper: str = choice("Paper", {name: name for name in PAPER}, lambda robot: suited(robot)[1])
+    length: float = number("Distance of the sockets", lambda robot: suited(robot)[0], LENGTHS, "length")
     places: int = number("Places", 1, (1, BOARDS), whole=True, hint=PLACES_HINT)
     plane: bool = flag("Touch the table too", hint="Anywhere, beside the fixture")
-    count: int = number("Touches", 20, (1, MOST), whole=True)
+    count: int = number(
+        "Touches",
+        lambda robot: max(COUNT, fewest(robot)),
+        (1, MOST),
+        whole=True,
+        within=lambda robot: (fewest(robot), MOST),
+        hint=COUNT_HINT,
+    )
     joints: str = text("Joint values", hint=JOINTS_HINT, longest=400)
     run: Run | None = kept(None, to_json=to_json, from_json=from_json, renew=False)
     wanted: int = memory(0)
@@ -89,11 +94,6 @@ class CalibrateSettings(Settings):
 @dataclass(frozen=True, eq=False)
 class CalibrateFacts(Facts[CalibrateSettings]):
     """The arm and its run."""
-
-    @property
-    def least(self) -> int:
-        """How many touches a fit needs."""
-        return self.robot.n + 1
 
     @property
     def found(self) -> Found | None:
@@ -139,7 +139,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             found.append(Work("plan", self._plan, (robot, what, s.wanted, s.run), poll=LOOK_AGAIN))
         if s.run is not None:
             found.append(Sweep(self._look, LOOK_AGAIN))
-            if len(touches := s.run.touches) > robot.n:
+            if len(touches := s.run.touches) >= fewest(robot):
                 args = robot, s.run.what, touches
                 found.append(Work("fit", self._fit, args, rest=REST, poll=LOOK_AGAIN, keep=True))
         return found
@@ -176,8 +176,8 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         elif key == "plan" and result.finished:
             made: Run = result.value
             if run is None:
-                self.change(wanted=0, run=made)
-                self.on_to(made.at)
+                self.change(wanted=0)
+                self._show(made)
                 self.stage.fit_view((), made.spots)
             else:  # something may be being typed for the posture on show
                 self.change(wanted=0, run=replace(made, at=run.at, course=run.course))
@@ -196,7 +196,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         about = Html(views.about, (self.read.robot,), key="about")
         if s.wanted:
             cancel = Button("Cancel", self.event(self.on_cancel), key="cancel")
-            return [about, Html(views.busy, key="busy"), cancel]
+            return [about, Html(render, ("calibrate/busy",), key="busy"), cancel]
         acts = {"Propose": self.event(self.on_plan), "Save sheet": self.event(self.on_print)}
         offered = tuple(name for name in acts if s.kind == "sheet" or name != "Save sheet")
         hint = "Where to touch, and what it is expected to bring; the sheet to print, as SVG"
@@ -224,7 +224,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             Html(views.posture, (f.robot, run, s.measured, f.units), key="posture"),
             Control("joints", of=run.at),
             Buttons("Touch", acts, offered=offered, of=run.at, key="touch"),
-            Html(views.touches, (run, f.found, f.least), key="touches"),
+            Html(views.touches, (run, f.found, fewest(f.robot)), key="touches"),
         ]
         if (error := f.work("fit").error) is not None:
             nodes.append(Html(views.failed, (str(error),), key="failed"))
@@ -289,29 +289,26 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
 
     def on_take(self) -> None:
         """Take what is typed; raises `InputError`: it cannot be read, and stays."""
-        # On a press alone: the field sends every letter, and 6 is on the way to 6.5.
-        robot, units = self.stage.now.robot, self.stage.units
-        self._take(read_joints(self.settings.joints, robot, self._run.what, units))
+        # On a press alone: the field sends every letter, and 6 is on the way to 6.5. A press comes after all that
+        # was typed before it, and what the field of another posture sends later is void (`PanelView`).
+        run, stage = self._run, self.stage
+        self._show(run.with_read(read_joints(self.settings.joints, stage.now.robot, run.what, stage.units)))
 
     def on_read(self) -> None:
-        """Take where the connected arm is."""
-        if (measured := self.settings.measured) is not None:
-            self._take(measured)
+        """Take where the connected arm is; raises `InputError`: no such arm can be there."""
+        if (q := self.settings.measured) is not None:
+            run, stage = self._run, self.stage
+            self._show(run.with_read(readable(q, stage.now.robot, run.what, stage.units, radians=True)))
 
     def on_forget(self) -> None:
         """Forget what was read in this posture."""
-        self._take(None)
+        self._show(self._run.with_read(None))
 
     def on_to(self, at: int) -> None:
-        """Show a posture, and what was read in it.
-
-        What is typed and not taken is given up: letters of it may be on their way.
-        """
-        run = self._run.to(at)
-        scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
-        read = zip(run.read[run.at] or (), scales, strict=False)
-        self.change(run=run, joints=" ".join(f"{value * scale:.8g}" for value, scale in read))
-        self.rewrite()
+        """Show a posture; what is typed for the one before is taken. Raises `InputError`: it cannot be read."""
+        if self.settings.joints.strip() and self.settings.joints != self._written(self._run):
+            self.on_take()
+        self._show(self._run.to(at))
 
     def on_report(self) -> None:
         """Save what was found as one page."""
@@ -337,14 +334,20 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         self.change(run=None, joints="", wanted=0)
         self.stage.fit_view(())
 
-    def _take(self, q: tuple[float, ...] | None) -> None:
-        """Take what was read in the posture on show; None: nothing."""
-        self.change(run=self._run.with_read(q))
-        self.on_to(self._run.at)
+    def _show(self, run: Run) -> None:
+        """Show the posture of a run, and what was read in it."""
+        self.change(run=run, joints=self._written(run))
+        self.rewrite()
+
+    def _written(self, run: Run) -> str:
+        """What was read in the posture on show, as it is typed."""
+        scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
+        read = zip(run.read[run.at] or (), scales, strict=False)
+        return " ".join(f"{value * scale:.8g}" for value, scale in read)
 
     def on_style(self) -> None:
         if (run := self.settings.run) is not None and run.read[run.at] is not None:
-            self.on_to(run.at)  # in other units
+            self._show(run)  # in other units
         super().on_style()
 
     # Links

@@ -16,17 +16,16 @@ from kin import InputError, Robot
 from kin.calibration import Calibration, TouchBoard, TouchFixture, TouchPlan, calibrate, touch_postures
 from kin.calibration.fixtures import PAPER
 from kin.calibration.model import Model
-from kin.calibration.words import listed
 from kin.comparison import Comparison
+from kin.ik.messages.values import listed
 from kin.transforms import Array
 from kin.typed import ReadError, elements, read_element
 from kin.units import Units
 
 LENGTHS = (0.01, 2.0)  # m: of a bar
 MOST, BOARDS = 60, 6  # touches and places of one run: they are in the link of the page
-MORE = 5  # touches that are asked for besides
+COUNT, MORE = 20, 5  # touches that are asked for at first, and besides
 FAR = math.radians(20.0), 0.1  # of a joint value from the one that was asked: rad, m
-SMALL = 0.7  # m: arms with a shorter reach take a smaller fixture
 _FARTHEST = 1e3  # m, rad: of any number in a link
 
 
@@ -162,9 +161,12 @@ def planned(robot: Robot, what: Touched, count: int, run: Run | None, cancel: Ca
 
 
 def solved(robot: Robot, what: Touched, touches: tuple[Touch, ...], cancel: Callable[[], None]) -> Found:
-    """What touches have shown; raises `InputError`: they are too few, or in one posture."""
+    """What touches have shown; raises `InputError`: they are in one posture."""
     q, sockets = [each.q for each in touches], [each.socket for each in touches]
-    found = calibrate(robot, q, sockets, what.fixture, cancel=cancel)
+    try:
+        found = calibrate(robot, q, sockets, what.fixture, cancel=cancel)
+    except InputError as error:
+        raise error.renamed("touches") from None
     return Found(touches, found, kin.compare(robot, found.robot, explain=False))
 
 
@@ -183,11 +185,24 @@ def read_joints(text: str, robot: Robot, what: Touched, units: Units) -> tuple[f
         values = [read_element(word, unit) for word, unit in zip(words, of, strict=True)]
     except ReadError as error:
         raise InputError("joint values", text, f"{valid}: {error.reason}") from None
+    return readable(tuple(values), robot, what, units, not units.degrees)
+
+
+def readable(q: tuple[float, ...], robot: Robot, what: Touched, units: Units, radians: bool) -> tuple[float, ...]:
+    """The same joint values, if joints can have them; raises `InputError` naming the joint.
+
+    Args:
+        radians: whether they were given in radians, and so may be degrees by mistake.
+    """
     least, most = Model.of(robot, what.fixture).readable
-    for joint, unit, value, low, high in zip(robot.joints, of, values, least, most, strict=True):
+    for joint, turns, value, low, high in zip(robot.joints, robot.revolute, q, least, most, strict=True):
         if not low <= value <= high:
-            raise InputError(joint.name, unit.text(value), f"{unit.text(low)} to {unit.text(high)}")
-    return tuple(values)
+            unit = units.of(bool(turns))
+            valid = f"{unit.text(low)} to {unit.text(high)}"
+            if radians and turns and abs(value) > 2.0 * math.pi:
+                valid += "; are these degrees? Here they are radians"
+            raise InputError(joint.name, unit.text(value), valid)
+    return q
 
 
 def doubt(robot: Robot, asked: Array, read: tuple[float, ...]) -> str:

@@ -113,8 +113,3 @@ def result(found: Found, units: Units) -> str:
 def failed(why: str) -> str:
     """Why there is no result."""
     return render("calibrate/failed", why=why)
-
-
-def busy() -> str:
-    """Postures are being chosen."""
-    return render("calibrate/busy")

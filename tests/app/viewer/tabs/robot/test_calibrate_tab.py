@@ -17,6 +17,7 @@ from bare_page import BarePage, bare_page
 import kin
 from app.shared.summaries import Summaries
 from app.viewer.own_arm import OwnArm
+from app.viewer.session.worker.inbox import Inbox
 from app.viewer.tabs.robot.calibrate.feature import Calibrate
 from app.viewer.tabs.robot.calibrate.run import (
     MORE,
@@ -136,12 +137,17 @@ def test_joint_values_are_read_in_the_units_of_the_page() -> None:
         ("1 2 3 4 5 x", "expected 6 numbers"),
         ("", "expected 6 numbers"),
         ("1 2 3 4 5 1e999", "expected 6 numbers|wrist 3: got"),
-        ("0 0 0 900 0 0", "wrist 1: got '900.0°', expected -?[−0-9.]+° to [0-9.]+°"),
+        ("0 0 0 900 0 0", "wrist 1: got '900.0°', expected -?[−0-9.]+° to [0-9.]+°$"),
     ],
 )
 def test_other_texts_are_refused_with_the_joint_the_value_and_what_is_valid(text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read_joints(text, UR5E, BAR, Units())
+
+
+def test_degrees_are_suspected_where_radians_are_typed() -> None:
+    with pytest.raises(InputError, match=r"wrist 1: got '90.0+ rad', expected .* rad; are these degrees"):
+        read_joints("0 0 0 90 0 0", UR5E, BAR, Units(degrees=False))
 
 
 def test_a_touch_far_from_its_posture_is_questioned() -> None:
@@ -184,8 +190,10 @@ class Page:
         """Handle what was posted, and tick, until something is so."""
         end = time.monotonic() + most
         while not done():
+            inbox = Inbox()
             while self.page.events:
-                key, value = self.page.events.pop(0)
+                inbox.post(*self.page.events.pop(0))
+            for key, value in inbox.take() or []:
                 self.feature.handle(key[2], value)
             self.feature.tick(time.perf_counter())
             assert time.monotonic() < end, "it does not come to that"
@@ -228,12 +236,14 @@ def test_postures_are_proposed_and_the_sheet_is_saved(page: Page) -> None:
     assert page.saved["touch-sheet-A3.svg"].startswith(b"<svg")
     page.set("Touch", "two sockets of a bar")
     assert page.feature.settings.length == 0.15
-    page.set("Touches", 3)
+    with pytest.raises(InputError, match="count: got 6, expected a whole number from 7 to 60"):
+        page.set("Touches", 6)
+    page.set("Touches", 7)
     page.set("Postures", "Propose")
     page.until(lambda: page.feature.settings.run)
-    assert len(page.run.q) == 3
+    assert len(page.run.q) == 7
     assert (page.run.what.kind, page.run.what.length, page.run.what.places) == ("bar", 0.15, 1)
-    assert "Posture 1 of 3: socket" in page.html
+    assert "Posture 1 of 7: socket" in page.html
     assert "7 more touches until there is a result" in page.html
     drawn = [kind for kind, _, _ in page.page.scene()]
     assert "BatchedMeshHandle" in drawn
@@ -248,13 +258,15 @@ def test_typed_touches_give_the_arm_that_becomes_the_one_of_the_page(
     begun(page, run)
     for i, q in enumerate(read):
         page.set("Joint values", "1 2")
-        with pytest.raises(InputError, match="joint values: got '1 2'"):
-            page.set("Touch", "Take")
-        assert page.run.at == i
-        assert page.run.read[i] is None
-        assert page.feature.settings.joints == "1 2", "what was typed is still there"
+        for button in ("Take", "Next") if i < COUNT - 1 else ("Take",):
+            with pytest.raises(InputError, match="joint values: got '1 2'"):
+                page.set("Touch", button)
+            assert page.run.at == i
+            assert page.run.read[i] is None
+            assert page.feature.settings.joints == "1 2", "what was typed is still there"
         page.set("Joint values", typed(q))
-        page.set("Touch", "Take")
+        if i % 2 or i == COUNT - 1:
+            page.set("Touch", "Take")
         if i < COUNT - 1:
             page.set("Touch", "Next")
         assert page.run.read[i] == pytest.approx(q, abs=1e-7)
@@ -293,9 +305,29 @@ def test_joint_values_are_taken_on_a_press_and_not_while_they_are_typed(page: Pa
     assert page.page.control("Joint values").value == text
     taken = page.run
     page.set("Touch", "Next")
-    page.set("Joint values", text[:-1])  # a letter that was on its way
     page.set("Touch", "Back")
-    assert page.run.read == taken.read, "only Take takes"
+    assert page.run.read == taken.read, "nothing typed, nothing taken"
+
+
+@pytest.mark.parametrize(
+    "acts",
+    [("text", "Next"), ("text", "Next", "late"), ("part", "text", "Next", "late"), ("Next", "text")],
+    ids=str,
+)
+def test_what_is_typed_is_never_a_reading_of_the_next_posture(page: Page, run: Run, acts: tuple[str, ...]) -> None:
+    """What was typed before the press is taken and nothing else, also if all of it waits in the inbox at once."""
+    text = "11.5 -78.25 110 -40.5 17.5 -0.5"
+    texts = {"part": text[:-1], "text": text, "late": text + "5"}
+    begun(page, run)
+    for act in acts:
+        page.page.set(*(("Joint values", texts[act]) if act in texts else ("Touch", act)))
+    page.until(lambda: not page.page.events)
+    assert page.run.at == 1
+    assert page.feature.settings.joints == ""
+    page.set("Touch", "Next")
+    expected = [pytest.approx(np.radians([float(word) for word in text.split()]))] if acts[-1] != "text" else []
+    assert [each.q for each in page.run.touches] == expected
+    assert [each.at for each in page.run.touches] == [0] * len(expected)
 
 
 def test_a_reload_loses_nothing(page: Page, run: Run, read: list[tuple[float, ...]]) -> None:
@@ -324,6 +356,11 @@ def test_the_connected_arm_is_compared_and_read(page: Page, run: Run) -> None:
     page.set("Touch", "Read")
     assert page.run.read[0] == pytest.approx(run.q[0] + 0.1, abs=1e-5)
     page.set("Touch", "Leave out")
+    assert page.run.read[0] is None
+    page.line.measured = np.degrees(run.q[0])
+    page.until(lambda: page.feature.settings.measured[1] == pytest.approx(np.degrees(run.q[0, 1])))
+    with pytest.raises(InputError, match=r"expected .*°; are these degrees"):
+        page.set("Touch", "Read")
     assert page.run.read[0] is None
     page.line.measured = [0.0]  # of another arm
     page.until(lambda: page.feature.settings.measured is None)
@@ -402,6 +439,18 @@ def test_postures_that_cannot_be_touched_are_said(page: Page) -> None:
     assert page.page.notices[-1].title == "No postures were found"
     assert "socket" in page.page.notices[-1].detail
     assert page.feature.settings.wanted == 0
+
+
+def test_touches_in_one_posture_are_refused_in_words(page: Page, run: Run, read: list[tuple[float, ...]]) -> None:
+    made = run
+    for i in range(COUNT):
+        made = made.to(i).with_read(read[0])
+    begun(page, made)
+    page.until(lambda: page.feature.facts.work("fit").error)
+    page.feature.refresh()
+    said = "touches: got 'all in one posture', expected postures that differ by 5° in some joint or more"
+    assert said in page.html
+    assert page.run.touches == made.touches, "nothing is lost"
 
 
 def test_other_units_write_what_was_read_anew(page: Page, run: Run, read: list[tuple[float, ...]]) -> None:
