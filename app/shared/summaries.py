@@ -12,11 +12,11 @@ from typing import Any, NamedTuple, TypeVar
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
-from kin import JointConstraints, Obstacle, Robot, compare, cuspidal, leave_singularity, posture_map
+from kin import JointConstraints, Obstacle, Robot, compare, leave_singularity, posture_map
 from kin.comparison import Comparison, Frames
 from kin.escape import Exits
 from kin.ik.options import FREE
-from kin.postures import Cuspidality, PostureMap
+from kin.postures import PostureMap
 from kin.transforms import Array
 from kin.workspace import Section, WorkspaceFacts, workspace_facts, workspace_section
 
@@ -127,13 +127,6 @@ class Summaries:
     def once(self, key: Hashable, compute: Callable[[Callable[[], None]], T]) -> Subscription[T]:
         """What `compute` returns for this key, for all who ask; its argument raises once nobody waits any more."""
         return self._others.subscribe(key, lambda computation: compute(computation.check))
-
-    def cuspidality(self, robot: Robot, constraints: JointConstraints) -> Subscription[Cuspidality]:
-        """A verdict as by `kin.cuspidal`."""
-        return self.once(
-            ("cuspidal", robot, constraints),
-            lambda cancel: cuspidal(robot, constraints=constraints, cancel=cancel),
-        )
 
     def exits(self, robot: Robot, q: Array, obstacles: tuple[Obstacle, ...]) -> Subscription[Exits]:
         """The ways out of a singularity as by `kin.leave_singularity`; links with known bodies do not touch."""

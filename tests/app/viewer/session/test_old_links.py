@@ -213,7 +213,7 @@ def described(state: PageState) -> dict[str, Any]:
 
 LATER = {
     "rotations": {"axes": "all"},
-    "workspace": {"postures": {"plane": "vertical", "limits": True}},
+    "workspace": {"postures": {"plane": "vertical", "limits": True, "drawn": True}},
 }  # settings that links did not have when these were recorded
 RECORDED: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
 

@@ -254,14 +254,14 @@ def verdict(monkeypatch):
     """What is found of any arm."""
     found = kin.postures.Cuspidality(UR5, "yes", "loop", LOOP, True, 0.02, 8, 3)
     asked = SimpleNamespace(found=found)
-    monkeypatch.setattr("app.shared.summaries.cuspidal", lambda *_, **__: asked.found)
+    monkeypatch.setattr(kin, "cuspidal", lambda *_, **__: asked.found)
     return asked
 
 
 def judged(page: BarePage) -> None:
     page.press("Cuspidal or not")
     page.rest()
-    page.summaries.cuspidality(page.now.robot, page.now.options.constraints).future.result(60.0)  # type: ignore[attr-defined]
+    page.feature._judge(page.now.robot, page.now.options.constraints).future.result(60.0)
     page.rest()
 
 
@@ -307,9 +307,20 @@ def test_an_arm_that_is_not_cuspidal_says_why(page):
     page.press("Cuspidal or not")
     page.rest()
     with pytest.raises(kin.InputError):
-        page.summaries.cuspidality(page.now.robot, page.now.options.constraints).future.result(60.0)
+        page.feature._judge(page.now.robot, page.now.options.constraints).future.result(60.0)
     page.rest()
     assert "lock the others" in words(page)
+
+
+def test_of_several_loops_the_highest_is_shown(monkeypatch):
+    low = LOOP * np.array([1.0, -9.0, 1.0, 1.0, 1.0, 1.0])
+
+    def search(*_, seed=0, **__):
+        loop = {0: low, 3: LOOP, 4: None}.get(seed, low)
+        return kin.postures.Cuspidality(UR5, "yes", "loop", loop, loop is not None, 0.02, 8, 3, seed)
+
+    monkeypatch.setattr(kin, "cuspidal", search)
+    assert views.judge(UR5, kin.JointConstraints(), lambda: None).seed == 3
 
 
 @pytest.mark.full
@@ -322,3 +333,5 @@ def test_the_gofa_comes_back_in_another_posture(page):
     first, last = kin.fk(found.robot, found.loop[[0, -1]])
     assert np.allclose(first, last, atol=1e-6)
     assert np.abs(wrapped(found.loop[-1] - found.loop[0])).max() > 0.05
+    q = np.linspace(found.loop[0], found.loop[-1], 50)
+    assert len(found.loop) > 2 or kin.link_frames(found.robot, q)[..., 2, 3].min() > 0.0, "above the floor"

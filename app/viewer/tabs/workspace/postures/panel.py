@@ -7,9 +7,11 @@ same one. A click in it, or a button of one of its regions, makes that place the
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from functools import partial
 
 import numpy as np
 
+from app.shared.computations import Subscription
 from app.shared.summaries import PostureRequest
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
@@ -25,7 +27,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.postures import views
 from app.viewer.tabs.workspace.postures.settings import PostureSettings
-from kin import InputError
+from kin import InputError, JointConstraints, Robot
 from kin.angles import apart
 from kin.postures import Cuspidality, PostureMap
 from kin.units import typeset
@@ -169,7 +171,7 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         if s.request is not None:
             works.append(Work("map", summaries.postures, (s.request,), poll=POLL))
         if s.judged is not None:
-            works.append(Work("cuspidal", summaries.cuspidality, (self.facts.robot, s.judged)))
+            works.append(Work("cuspidal", self._judge, (self.facts.robot, s.judged)))
         if s.loop is not None:
             works.append(Sweep(self._play, FRAME))
         return works
@@ -240,6 +242,10 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         else:
             words = f"Not available: {short(posture.name)}"
             self.stage.notify(Notice("limits", words, "It is outside the limits."))
+
+    def _judge(self, robot: Robot, constraints: JointConstraints) -> Subscription[Cuspidality]:
+        compute = partial(views.judge, robot, constraints)
+        return self.stage.summaries.once(("cuspidal", robot, constraints), compute)
 
     def on_judge(self) -> None:
         """Find out whether the arm is cuspidal, with its present limits and locks."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 
 import kin
@@ -15,7 +18,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
 from app.viewer.tabs.workspace.pick import MARK_COLOUR
 from app.viewer.views.templates import render
-from kin import IKOptions, Robot
+from kin import IKOptions, JointConstraints, Robot
 from kin.angles import wrapped
 from kin.ik import solve
 from kin.postures import Cuspidality, PostureMap
@@ -29,6 +32,7 @@ COLOR: Color = (0, 158, 115)  # of the loop
 OPACITY = 0.35
 SHEER = 0.55  # opacity of a section in the scene
 _EVERY = 5  # waypoint of the loop is drawn
+SEARCHES = 8  # for loops, once one is found
 
 
 def note(text: str) -> str:
@@ -104,6 +108,23 @@ def section_nodes(found: PostureMap, dark: bool) -> list[Node]:
             pairs = np.concatenate([np.stack([xy[:-1], xy[1:]], axis=1) for xy in curves])
             nodes.append(lines(kind, plane.origin + pairs @ np.array([plane.u, plane.v]), color, 2.0))
     return nodes
+
+
+def judge(robot: Robot, constraints: JointConstraints, cancel: Callable[[], None]) -> Cuspidality:
+    """Whether the arm is cuspidal; of several loops the highest, as others may pass through the floor."""
+    found = kin.cuspidal(robot, constraints=constraints, cancel=cancel)
+    if found.loop is None:
+        return found
+    seeds = range(1, SEARCHES)
+    others = [kin.cuspidal(robot, constraints=constraints, seed=seed, cancel=cancel) for seed in seeds]
+    return max((found, *others), key=lambda each: (each.in_limits, _lowest(each)))
+
+
+def _lowest(found: Cuspidality) -> float:
+    """The least height of a joint on a loop; −∞ without one."""
+    if found.loop is None:
+        return -math.inf
+    return float(kin.link_frames(found.robot, Drive.straight(found.loop).q[::_EVERY])[..., 2, 3].min())
 
 
 def verdict_words(found: Cuspidality) -> str:
