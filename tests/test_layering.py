@@ -91,8 +91,18 @@ RULES: dict[str, set[str]] = {
     "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},
     "app/bench/contestants": {
         *("kin", "numpy", "numba", "app.bench"),
-        *("eaik", "ik_geo", "ikpy", "pinocchio", "py_opw_kinematics", "roboticstoolbox", "ruckig", "scipy"),
-        *("roboplan", "spatialmath", "ssik", "toppra"),
+        *(
+            "coal",
+            "eaik",
+            "ik_geo",
+            "ikpy",
+            "pinocchio",
+            "py_opw_kinematics",
+            "roboticstoolbox",
+            "ruckig",
+            "scipy",
+        ),
+        *("roboplan", "spatialmath", "ssik", "toppra", "vamp"),
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "msgspec", "numpy", "kin"),

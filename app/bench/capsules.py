@@ -1,17 +1,23 @@
-"""Self-collision by plain numpy: the reference that answers are checked with, and a contestant."""
+"""Collisions by plain numpy: the reference that answers are checked with, and a contestant."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.axes import screw_x, screw_z
+from kin.collision import Obstacle
 from kin.collision.bodies import bodies_of
 from kin.robot import Robot
 from kin.transforms import Array
 
+_PARTS = 201  # configurations along a motion
 
-def distances(robot: Robot, q: Array) -> Array:
-    """Least distance ``(k,)`` of the compared capsules of an arm at configurations ``(k, n)``."""
+
+def distances(robot: Robot, q: Array, spheres: Sequence[Obstacle] = ()) -> Array:
+    """Least distance ``(k,)`` of the compared capsules of an arm, and of spheres, at configurations ``(k, n)``."""
     body = bodies_of(robot)
     frames = _frames(robot, q)[:, body.rows + 1]
     turn, place = frames[..., :3, :3], frames[..., :3, 3]
@@ -19,7 +25,20 @@ def distances(robot: Robot, q: Array) -> Array:
     ends = (turn @ body.shape[:, 3:6, None])[..., 0] + place
     first, second = body.pairs.T
     apart = _between(starts[:, first], ends[:, first], starts[:, second], ends[:, second])
-    return np.asarray((apart - body.shape[first, 6] - body.shape[second, 6]).min(axis=1, initial=np.inf))
+    least = (apart - body.shape[first, 6] - body.shape[second, 6]).min(axis=1, initial=np.inf)
+    starts, ways = starts[:, body.moving], ends[:, body.moving] - starts[:, body.moving]
+    squares, radii = np.einsum("...i,...i", ways, ways), body.shape[body.moving, 6]
+    for each in spheres:
+        apart = _to_segment(np.array(each.xyz), starts, ways, squares) - radii
+        least = np.minimum(least, apart.min(axis=1) - each.sizes[0])
+    return np.asarray(least)
+
+
+def touches_between(robot: Robot, q: Array, ends: Array, spheres: Sequence[Obstacle]) -> NDArray[np.bool_]:
+    """Whether an arm touches anything on straight motions of the joints ``(k, n)``, by configurations on each."""
+    parts = np.linspace(0.0, 1.0, _PARTS)[:, None]
+    pairs = zip(q, ends, strict=True)
+    return np.array([distances(robot, a + parts * (b - a), spheres).min() < 0.0 for a, b in pairs])
 
 
 def _frames(robot: Robot, q: Array) -> Array:

@@ -39,7 +39,8 @@ def bench(arguments: Namespace) -> int:
         return _refuse("NUMBA_DISABLE_JIT is set, so this would measure uncompiled code; unset it")
     missing = [peer.name for peer in settings.peers if not peer.installed]
     if missing and arguments.peers:
-        return _refuse(f"not installed: {', '.join(missing)}. {INSTALL} installs all of them")
+        words = [INSTALL, *(peer.name for peer in settings.peers if not peer.extra)]
+        return _refuse(f"not installed: {', '.join(missing)}. {' '.join(words)} installs all of them")
     if missing:
         print(f"kinboard: not installed: {', '.join(missing)}; {INSTALL} installs them", file=sys.stderr)
     progress = _Progress(sys.stderr)
@@ -101,7 +102,7 @@ def _peers(names: list[str] | None) -> tuple[Peer, ...]:
     for name in names or ():
         if name not in known:
             raise InputError("--peers", name, "of " + ", ".join(known) + ", or none")
-    return tuple(peer for peer in PEERS if not names or peer.name in names)
+    return tuple(peer for peer in PEERS if (peer.name in names if names else peer.extra or peer.installed))
 
 
 def _file(name: str, given: str | None) -> Path | None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 import kin
-from app.bench.capsules import distances
+from app.bench.capsules import distances, touches_between
 from app.bench.rows import Task
+from kin.robot import Robot
 from kin.transforms import Array
 
 ACCURACY = 1e-6
@@ -28,7 +30,8 @@ class Check:
         branches: correct and distinct answers per target, on average; None for forward kinematics.
         position_error, rotation_error: largest errors of the correct answers, metres and radians.
         wrong: answers per target with an error above `ACCURACY`.
-        same: share of targets with the same set of branches as ours; None where sets cannot be compared.
+        same: share of targets with the same set of branches as ours, or the same verdict; None where there is
+            nothing to compare.
         recall: share of targets at which the configuration they were made from is among the correct answers; None
             where one answer is enough.
     """
@@ -64,6 +67,20 @@ def judge_distances(task: Task, answers: list[Array]) -> Check:
     right, count = error <= ACCURACY, len(task.q)
     success = float(right.mean())
     return Check(success, None, float(error[right].max(initial=0.0)), 0.0, float((~right).sum()) / count, None)
+
+
+def judge_verdicts(task: Task, answers: list[Array], arm: Robot | None) -> Check:
+    """Whether something touches, one verdict per target, against plain numpy with the bodies of `arm`."""
+    right, count = np.array(answers) == touching(task, arm or task.robot), len(task.q)
+    return Check(float(right.mean()), None, 0.0, 0.0, float((~right).sum()) / count, None)
+
+
+@lru_cache(maxsize=8)
+def touching(task: Task, arm: Robot) -> NDArray[np.bool_]:
+    """Whether something touches at each target ``(N,)``, with the bodies of `arm`, by plain numpy."""
+    if task.ends is None:
+        return np.asarray(distances(arm, task.q, task.obstacles) < 0.0)
+    return touches_between(arm, task.q, task.ends, task.obstacles)
 
 
 def judge_motions(task: Task, motions: list[Array], limits: Array) -> Check:

@@ -16,12 +16,13 @@ time            median per pose or target
 noise           interquartile range, relative to the time
 × array         time relative to our array-level call: median of the ratios within each round
 × solve         the same relative to kin.solve_ik
-solved          share of targets with a correct answer; of motions: that arrive at rest and keep the limits
+solved          share of targets with a correct answer; of motions: that arrive at rest and keep the limits;
+                of collisions: with the verdict of plain numpy on the bodies that the library compares
 branches        correct, distinct answers per target
 recall          share of targets whose generating configuration is among the answers
 wrong           answers per target with an error above 1e-6
 worst residual  of the correct answers, by our forward kinematics
-same set        share of targets with the same set of branches as ours
+same set        share of targets with the same set of branches as ours, or the same verdict on a collision
 derivation      processor time to derive the solver, once per arm: not part of the time"""
 _HEAD = [
     "",

@@ -80,4 +80,4 @@ def robots() -> dict[str, Robot]:
         )
         for robot_id, (name, table) in _TABLES.items()
     }
-    return {**kin.files.classic_robots(), **others}
+    return {**kin.files.classic_robots(), "ur5e": kin.get_robot("ur5e"), **others}

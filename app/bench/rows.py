@@ -10,12 +10,14 @@ import numpy as np
 
 import kin
 from app.bench.arms import Arm, arm_of
+from app.bench.capsules import distances
 from app.bench.robots import robots
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
-Kind = Literal["fk", "branches", "answer", "cloud", "collision", "ptp", "points", "pace", "line"]
+Kind = Literal["fk", "branches", "answer", "cloud", "collision", "touch", "edge", "ptp", "points", "pace", "line"]
+COLLISIONS: tuple[Kind, ...] = ("touch", "edge")
 MOTIONS: tuple[Kind, ...] = ("ptp", "points", "pace", "line")
 
 
@@ -28,12 +30,14 @@ class Row:
         robot: id of the arm, see :mod:`app.bench.robots`.
         kind: ``"fk"``; ``"branches"``, all configurations, ignoring limits; ``"answer"``, at least one inside the
             limits, verified; ``"cloud"``, tool points of configurations that the contestant samples itself;
-            ``"collision"``, the least distance between links; ``"ptp"``, a motion from home to a configuration;
-            ``"points"``, points of one; ``"pace"``, the fastest motion along a given path of the joints;
-            ``"line"``, points of a line of the tool from home.
+            ``"collision"``, the least distance between links; ``"touch"``, whether anything touches; ``"edge"``,
+            whether it does on a straight motion of the joints that begins free; ``"ptp"``, a motion from home to a
+            configuration; ``"points"``, points of one; ``"pace"``, the fastest motion along a given path of the
+            joints; ``"line"``, points of a line of the tool from home.
         batch: all targets in one call.
         approach: point and approach direction only; the roll about the tool axis does not matter.
         lock: for a redundant arm, the joint that solvers for six joints lock at `value`.
+        caged: whether there are obstacles around the arm, see `CAGE`; links are compared with each other too.
         unverified: whether branches of our array-level call may miss a part of the pose, so that wrong answers
             are expected of it.
         value: value of the locked joint and of our redundancy parameter in radians; NaN if there is none.
@@ -47,11 +51,33 @@ class Row:
     approach: bool = False
     lock: int | None = None
     value: float = math.nan
+    caged: bool = False
     unverified: bool = False
 
 
+_AROUND = 0.5  # m, from the axis of the base
+_EDGE = 1.0  # rad, the length of a motion
+_DRAWN = 16  # configurations for each one that has to be free
 _SHORT = 0.05  # of the way from home to a random configuration: the end of a line that can be driven
+# Spheres that VAMP, coal and plain numpy have too; about half of all configurations of the arms touch one.
+CAGE = tuple(
+    kin.Obstacle("sphere", (_AROUND * math.cos(angle), _AROUND * math.sin(angle), height), radius=0.15)
+    for height in (0.25, 0.8)
+    for angle in np.arange(0.0, 2.0 * math.pi, math.pi / 3.0).tolist()
+)
 CLOUD = 16  # batches in a cloud, so that call overhead is negligible and caches are as full as in real use
+
+
+def _collisions(robot: str) -> tuple[Row, ...]:
+    alone, caged = "whether links touch", "whether links or obstacles touch"
+    return (
+        Row(f"touch-{robot}", alone, robot, "touch"),
+        Row(f"touch-{robot}-batch", f"{alone}, batch, per configuration", robot, "touch", batch=True),
+        Row(f"cage-{robot}", caged, robot, "touch", caged=True),
+        Row(f"cage-{robot}-batch", f"{caged}, batch, per configuration", robot, "touch", batch=True, caged=True),
+        Row(f"edge-{robot}", f"{caged} on a motion of 1 rad", robot, "edge", caged=True),
+    )
+
 
 ROWS: tuple[Row, ...] = (
     Row("fk", "forward kinematics, one pose", "pioneer5", "fk"),
@@ -145,6 +171,8 @@ ROWS: tuple[Row, ...] = (
         batch=True,
     ),
     Row("collision", "distance of the nearest links, batch, per configuration", "panda", "collision", batch=True),
+    *_collisions("panda"),
+    *_collisions("ur5e"),
     Row("motion-ptp", "a motion of the joints with limits of jerk", "panda", "ptp"),
     Row("motion-points", "100 points of a motion of the joints", "panda", "points"),
     Row("motion-pace", "the fastest pace on a path, limits of velocity and acceleration", "panda", "pace"),
@@ -159,6 +187,8 @@ class Task:
     Attributes:
         q: ``(N, n)`` the configurations the targets were made from, inside the limits.
         T: ``(N, 4, 4)`` their poses, by plain matrix products, independent of our kernels.
+        obstacles: spheres around the arm.
+        ends: ``(N, n)`` where motions of the joints from `q` end, inside the limits; of an edge only.
         arm: the whole arm.
         six: the arm with six joints that turn, for solvers that need six; None if there is none.
     """
@@ -169,6 +199,8 @@ class Task:
     T: Array
     arm: Arm
     six: Arm | None
+    obstacles: tuple[kin.Obstacle, ...] = ()
+    ends: Array | None = None
 
 
 def prepare(row: Row, size: int, seed: int) -> Task | None:
@@ -180,6 +212,13 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
         q = kin.workspace.workspace_configurations(robot, np.arange(CLOUD * size))
     else:
         q = robot.random_q(np.random.default_rng(seed), size)
+    obstacles, ends = CAGE if row.caged else (), None
+    if row.kind == "edge":
+        rng = np.random.default_rng(seed)
+        q = robot.random_q(rng, _DRAWN * size)
+        q = q[distances(robot, q, obstacles) > 0.0][:size]
+        ways = rng.normal(size=q.shape)
+        ends = robot.clip(q + _EDGE * ways / np.linalg.norm(ways, axis=1, keepdims=True))
     if row.lock is not None:
         q[:, row.lock] = row.value
     if row.kind == "line":
@@ -193,4 +232,5 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
     elif row.lock is not None:
         six = arm.locked(row.lock, row.value)
     whole = six.n == 6 and not arm.slides
-    return Task(row, robot, q, np.ascontiguousarray(arm.fk(q)), arm, six if whole else None)
+    T = np.ascontiguousarray(arm.fk(q))
+    return Task(row, robot, q, T, arm, six if whole else None, obstacles, ends)

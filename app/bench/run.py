@@ -16,9 +16,17 @@ import numpy as np
 import kin
 from app.bench.contestants import FLOOR, KINBOARD, OURS, PEERS, SOLVE_IK, Contestant, Peer, quiet
 from app.bench.contestants.motions import limits_of
-from app.bench.judge import Check, judge_distances, judge_motions, judge_poses, right_sets, share_of_same
+from app.bench.judge import (
+    Check,
+    judge_distances,
+    judge_motions,
+    judge_poses,
+    judge_verdicts,
+    right_sets,
+    share_of_same,
+)
 from app.bench.measure import Clock, Turns, measure, ratio
-from app.bench.rows import MOTIONS, ROWS, Row, Task, prepare
+from app.bench.rows import COLLISIONS, MOTIONS, ROWS, Row, Task, prepare
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
@@ -192,6 +200,11 @@ def _checked(
                         found.append((contestant, judge_poses(task, answers)))
                     elif task.row.kind == "collision":
                         found.append((contestant, judge_distances(task, answers)))
+                    elif task.row.kind in COLLISIONS:
+                        ours = answers if ours is None else ours
+                        same = float(np.mean([a == b for a, b in zip(ours, answers, strict=True)]))
+                        check = judge_verdicts(task, answers, contestant.bodies)
+                        found.append((contestant, replace(check, same=same)))
                     elif task.row.kind in MOTIONS:
                         found.append((contestant, judge_motions(task, answers, limits_of(task))))
                     else:

@@ -189,6 +189,25 @@ def test_distances_between_links_are_compared_with_plain_numpy():
     assert judge.judge_distances(task, [ours[0] + 1e-3, *ours[1:]]).wrong == 1 / 64
 
 
+def test_a_verdict_is_that_of_plain_numpy_on_the_bodies_that_are_compared():
+    task = prepare(ROWS_BY_ID["cage-panda-batch"], 64, 1)
+    ours = answers_of(task)
+    assert 0.25 < np.mean(ours) < 0.75
+    assert judge.judge_verdicts(task, ours, None).success == 1.0
+    assert judge.judge_verdicts(task, [not ours[0], *ours[1:]], None).wrong == 1 / 64
+    thin = replace(task.robot, capsules=[replace(each, radius=0.01) for each in task.robot.capsules])
+    assert judge.judge_verdicts(task, ours, thin).success < 1.0
+
+
+def test_motions_are_judged_between_their_ends():
+    task = prepare(ROWS_BY_ID["edge-panda"], 12, 1)
+    ours = answers_of(task)
+    assert judge.judge_verdicts(task, ours, None).success == 1.0
+    ends = replace(task, q=task.ends, ends=None)
+    assert 0 < judge.touching(ends, task.robot).sum() < np.sum(ours) < 12
+    assert not judge.touching(replace(task, ends=None), task.robot).any()
+
+
 @pytest.mark.parametrize("name", ["motion-points", "motion-pace"])
 def test_motions_of_all_rows_keep_the_limits(name):
     task = prepare(ROWS_BY_ID[name], 4, 1)
@@ -315,9 +334,15 @@ def test_an_interrupted_run_reports_its_results_so_far():
 
 @pytest.mark.full
 @pytest.mark.parametrize(
-    "row", ["fk", "fk-batch", "ik-pioneer5", "ik-pioneer5-batch", "ik-srs", "solve-redundant7-craig"]
+    "row",
+    [
+        *("fk", "fk-batch", "ik-pioneer5", "ik-pioneer5-batch", "ik-srs", "solve-redundant7-craig"),
+        *("touch-ur5e", "cage-panda-batch", "edge-panda"),
+    ],
 )
-@pytest.mark.parametrize("peer", [peer for peer in PEERS if peer.installed], ids=lambda peer: peer.name)
+@pytest.mark.parametrize(
+    "peer", [peer for peer in PEERS if peer.installed and peer.extra], ids=lambda peer: peer.name
+)
 def test_every_installed_peer_solves_the_same_task(peer, row):
     found = run(brief(row, peers=(peer,)))
     assert found.refused == ()
@@ -403,6 +428,22 @@ def test_a_requested_peer_must_be_installed(capsys, monkeypatch):
     assert "not installed: eaik. pip install 'kinboard[bench]'" in err
 
 
+def test_what_the_extra_does_not_bring_is_named_and_not_missed(capsys, monkeypatch):
+    monkeypatch.setattr(Peer, "installed", property(lambda self: False))
+    code, _, err = bench(capsys, "--peers", "vamp-planner")
+    assert code == 2
+    assert "pip install 'kinboard[bench]' vamp-planner installs all of them" in err
+    seen = []
+
+    def stopped(settings, say):
+        seen.extend(peer.name for peer in settings.peers)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run", stopped)
+    bench(capsys)
+    assert seen == [peer.name for peer in PEERS if peer.name != "vamp-planner"]
+
+
 def test_uncompiled_code_is_not_measured(capsys, monkeypatch):
     monkeypatch.setattr(command, "fk_one", lambda model, q: None)
     code, _, err = bench(capsys, "--peers", "none")
@@ -423,7 +464,7 @@ def test_ctrl_c_before_the_first_round_exits_with_a_message(capsys, monkeypatch)
 def test_the_extra_installs_every_peer():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extra = {re.match(r"[\w-]+", wanted).group() for wanted in project["optional-dependencies"]["bench"]}
-    assert extra - {"scipy"} == {peer.name for peer in PEERS} - {"numpy"}
+    assert extra - {"scipy"} == {peer.name for peer in PEERS if peer.extra} - {"numpy"}
 
 
 def test_every_row_has_a_floor_and_kinboard():

@@ -8,7 +8,7 @@ To add a library, write a function from `Task` to its contestants (none for task
 `PEERS`.
 """
 
-from app.bench.contestants import closed_forms, iterative, motions, ours
+from app.bench.contestants import closed_forms, collisions, iterative, motions, ours
 from app.bench.contestants.contestant import OURS, SOLVE_IK, Contestant, Peer, quiet
 from app.bench.rows import MOTIONS, Task
 
@@ -26,6 +26,8 @@ FLOOR = Peer("floor", "kin", ours.floor)
 PEERS: tuple[Peer, ...] = (
     Peer("numpy", "numpy", ours.plain_numpy),
     Peer("pin", "pinocchio", iterative.pinocchio),
+    Peer("coal", "coal", collisions.coal),
+    Peer("vamp-planner", "vamp", collisions.vamp, extra=False),
     Peer("eaik", "eaik", closed_forms.eaik),
     Peer("ssik", "ssik", closed_forms.ssik),
     Peer("ik-geo", "ik_geo", closed_forms.ik_geo),

@@ -16,6 +16,7 @@ import numpy as np
 import kin
 from app.bench.arms import Arm
 from app.bench.rows import Task
+from kin.robot import Robot
 from kin.transforms import Array
 
 OURS = "kinboard"
@@ -37,6 +38,7 @@ class Contestant:
         per_call: targets in a call.
         one: returns one solution instead of all.
         floor: does not solve the task; a lower bound for the others.
+        bodies: an arm with the bodies that it compares, if it has bodies of its own.
         derivation: seconds of processor time to derive or generate the solver of this arm, once; None if it
             derives nothing.
     """
@@ -48,16 +50,21 @@ class Contestant:
     per_call: int = 1
     one: bool = False
     floor: bool = False
+    bodies: Robot | None = None
     derivation: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A library: the name of its distribution, its module, and the function that makes its contestants."""
+    """A library: the name of its distribution, its module, and the function that makes its contestants.
+
+    `extra`: whether the extra `bench` brings it, which has only what need not be compiled.
+    """
 
     name: str
     module: str
     enter: Callable[[Task], list[Contestant]]
+    extra: bool = True
 
     @property
     def installed(self) -> bool:

@@ -16,10 +16,8 @@ def pinocchio(task: Task) -> list[Contestant]:
 
     if task.row.kind != "fk":
         return []
-    model = pin.Model()
-    last = 0
-    for i in range(task.arm.n):
-        last = model.addJoint(last, pin.JointModelRZ(), pin.SE3(task.arm.constants[i]), f"joint {i + 1}")
+    model = pinocchio_model(task)
+    last = model.njoints - 1
     tool = model.addFrame(pin.Frame("tool", last, pin.SE3(task.arm.constants[-1]), pin.FrameType.OP_FRAME))
     data = model.createData()
 
@@ -42,6 +40,16 @@ def pinocchio(task: Task) -> list[Contestant]:
         Contestant("pinocchio, its own SE3", pose, inputs, lambda T: [T.homogeneous]),
         Contestant("pinocchio", lambda q: pose(q).homogeneous, inputs, one_answer),
     ]
+
+
+def pinocchio_model(task: Task) -> Any:
+    """The arm as a chain of joints about z; its joint k is ours, 0 the world."""
+    import pinocchio as pin
+
+    model = pin.Model()
+    for i in range(task.arm.n):
+        model.addJoint(i, pin.JointModelRZ(), pin.SE3(task.arm.constants[i]), f"joint {i + 1}")
+    return model
 
 
 def toolbox(task: Task) -> list[Contestant]:

@@ -10,9 +10,9 @@ import numpy as np
 
 import kin
 from app.bench import capsules, floors
-from app.bench.contestants import motions
+from app.bench.contestants import collisions, motions
 from app.bench.contestants.contestant import FLOORS, OURS, SOLVE_IK, Contestant, no_answers, one_answer
-from app.bench.rows import MOTIONS, Task
+from app.bench.rows import COLLISIONS, MOTIONS, Task
 from kin.transforms import Array
 from kin.workspace.region import Region
 from kin.workspace.sampling.kernels import Points, sample_configurations, sample_points
@@ -37,6 +37,8 @@ def ours(task: Task) -> list[Contestant]:
         return _cloud(task)
     if row.kind in MOTIONS:
         return motions.ours(task)
+    if row.kind in COLLISIONS:
+        return collisions.ours(task)
     if row.kind == "collision":
         return [
             Contestant(OURS, kin.clearance, [(robot, task.q)], list, len(task.q)),
@@ -130,6 +132,9 @@ def plain_numpy(task: Task) -> list[Contestant]:
         return [Contestant("numpy", lambda q: task.arm.fk(q)[:, :3, 3], [(task.q,)], list, len(task.q))]
     if task.row.kind == "collision":
         return [Contestant("numpy", capsules.distances, [(task.robot, task.q)], list, len(task.q))]
+    if task.row.kind == "touch" and task.row.batch:
+        inputs = [(task.robot, task.q, task.obstacles)]
+        return [Contestant("numpy", capsules.distances, inputs, lambda apart: [*(apart < 0.0)], len(task.q))]
     if task.row.kind != "fk":
         return []
     if task.row.batch:
