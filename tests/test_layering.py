@@ -17,6 +17,7 @@ MODEL = {
     "kin.axes",
     "kin.differential",
     "kin.errors",
+    "kin.explained",
     "kin.fk",
     "kin.joint",
     "kin.motor",

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from kin.collision.contacts import Contact
+from kin.explained import Explained
 from kin.ik.details import LimitViolation
 from kin.ik.messages.singularity import short
 from kin.ik.messages.values import joint, listed, need
@@ -69,7 +70,7 @@ class Exit:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Exits:
+class Exits(Explained):
     """The ways out of a singularity, or why there are none.
 
     Attributes:
@@ -88,19 +89,10 @@ class Exits:
     exits: tuple[Exit, ...]
     cause: ExitCause | None
 
-    def __repr__(self) -> str:
-        """The sentences about it."""
-        return f"Exits({self.reason!r})"
-
     @property
     def found(self) -> bool:
         """Whether there is a way out."""
         return bool(self.exits)
-
-    @property
-    def reason(self) -> str:
-        """The answer in sentences, in degrees and millimetres."""
-        return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The answer in sentences, in any units.

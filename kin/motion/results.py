@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
+from kin.explained import Explained
 from kin.fk import fk, jacobian
 from kin.motion import messages, tables
 from kin.motion.arrivals import Arrival
@@ -82,7 +83,7 @@ class Peak:
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class Refusal(Explained):
     """Why a program cannot be driven.
 
     Attributes:
@@ -101,11 +102,6 @@ class Refusal:
     cause: Cause
     details: RefusalDetails
     helps: tuple[Help, ...] = ()
-
-    @property
-    def reason(self) -> str:
-        """The refusal in sentences, in degrees and millimetres."""
-        return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The refusal in sentences, in any units.
@@ -164,7 +160,7 @@ class InMotion:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Motion:
+class Motion(Explained):
     """The answer to a program: a motion, or why there is none.
 
     Attributes:
@@ -190,10 +186,6 @@ class Motion:
     part: Motion | None = None
     start: InMotion | None = None
 
-    def __repr__(self) -> str:
-        """The sentence about it."""
-        return f"Motion({self.reason!r})"
-
     @property
     def planned(self) -> bool:
         """Whether it can be driven."""
@@ -213,11 +205,6 @@ class Motion:
     def duration(self) -> float:
         """Seconds."""
         return float(self.starts[-1])
-
-    @property
-    def reason(self) -> str:
-        """The motion in sentences, in degrees and millimetres."""
-        return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The motion in sentences, in any units.

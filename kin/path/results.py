@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kin.collision.sweep import Touch
+from kin.explained import Explained
 from kin.ik.details import Details
 from kin.ik.messages import explain, rounded_target
 from kin.ik.results import Cause, Status
@@ -17,7 +18,7 @@ from kin.units import DEFAULT_UNITS, Units
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class PathJump:
+class PathJump(Explained):
     """A step of the path that is not continuous.
 
     Attributes:
@@ -44,11 +45,6 @@ class PathJump:
         """Where it is and why."""
         return f"PathJump({self.index}, {self.cause}: {self.reason!r})"
 
-    @property
-    def reason(self) -> str:
-        """The jump in a sentence, in degrees and millimetres."""
-        return self.explain()
-
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The jump in a sentence, in any units.
 
@@ -68,7 +64,7 @@ class PathJump:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class PathGap:
+class PathGap(Explained):
     """A waypoint without an exact solution.
 
     Attributes:
@@ -89,11 +85,6 @@ class PathGap:
         """Where it is and why."""
         return f"PathGap({self.index}, {self.status.value}: {self.reason!r})"
 
-    @property
-    def reason(self) -> str:
-        """The gap in a sentence, in degrees and millimetres."""
-        return self.explain()
-
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The gap in a sentence, in any units.
 
@@ -113,7 +104,7 @@ class PathGap:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PathResult:
+class PathResult(Explained):
     """A joint path, one configuration per waypoint.
 
     Attributes:
@@ -151,11 +142,6 @@ class PathResult:
         counts = (len(self.q), "waypoint"), (len(self.jumps), "jump"), (len(self.gaps), "gap")
         parts = ", ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in counts)
         return f"PathResult({parts}, {self.solver}: {self.reason!r})"
-
-    @property
-    def reason(self) -> str:
-        """The whole path in a sentence, in degrees and millimetres."""
-        return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The whole path in a sentence, in any units.

@@ -26,6 +26,7 @@ from kin.axes import generic_q, inverse, links_of
 from kin.differential.metric import extent
 from kin.differential.task import Task, natural_task, task_rows, usual_rank
 from kin.errors import InputError
+from kin.explained import Explained
 from kin.fk import fk
 from kin.ik.batch import solve_many
 from kin.ik.messages.values import count
@@ -138,7 +139,7 @@ class MapPlane:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PostureMap:
+class PostureMap(Explained):
     """How many postures there are, node by node.
 
     Attributes:
@@ -170,11 +171,6 @@ class PostureMap:
         return (
             f"PostureMap({self.robot.id!r}, {a} × {b}, {len(self.regions)} regions, {self.counts.max()} at most)"
         )
-
-    @property
-    def reason(self) -> str:
-        """The regions in words, in degrees and millimetres."""
-        return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The regions in words, for those who do not see the map, in any units."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from kin.collision.contacts import Contact
 from kin.differential.metric import weights
+from kin.explained import Explained
 from kin.ik.details import LimitViolation
 from kin.ik.messages.values import listed, need
 from kin.robot import Robot
@@ -36,7 +37,7 @@ class WayCause(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Way:
+class Way(Explained):
     """Waypoints between which the arm touches nothing, or why there are none.
 
     Attributes:
@@ -55,10 +56,6 @@ class Way:
     time_limit: float
     seconds: float
 
-    def __repr__(self) -> str:
-        """The sentence about it."""
-        return f"Way({self.reason!r})"
-
     @property
     def found(self) -> bool:
         """Whether there are waypoints."""
@@ -69,11 +66,6 @@ class Way:
         """Sum of the lengths of its parts in joint space: radians, a slide counting as a share of the arm's
         reach."""
         return 0.0 if self.q is None else path_length(self.robot, self.q)
-
-    @property
-    def reason(self) -> str:
-        """The answer in a sentence, in degrees and millimetres."""
-        return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
         """The answer in a sentence, in any units."""
