@@ -1,7 +1,7 @@
 """``python tests/bench/generated.py``: C and JavaScript that `kin.generate` writes, beside `kin.solve_ik`.
 
 One arm of each family. The same entry (all postures inside the limits, at their nearest whole turns, each checked
-by forward kinematics, sorted by the seed) solves the same targets as C (``gcc -O2``) and as JavaScript (the Node
+by forward kinematics, sorted by the seed) solves the same targets as C (``--cc``) and as JavaScript (the Node
 of Playwright), beside the kernels as numba compiles them, for arms without a redundancy parameter or with a given
 one, and beside `kin.solve_ik`; times are processor time, least of some passes. Machine code and the stack of the
 deepest chain of calls are those of ``gcc -Os``; ``-m32 -msoft-float`` stands for a microcontroller that computes
@@ -19,11 +19,12 @@ import gzip
 import json
 import math
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -121,7 +122,9 @@ def microseconds(run: Callable[[], int], count: int) -> tuple[float, int]:
     return 1e6 * min(spent) / count, total
 
 
-def in_c(arm: Arm, name: str, folder: Path, T: Any, seeds: Any, values: Any) -> tuple[Callable[[], int], Built]:
+def in_c(
+    arm: Arm, name: str, folder: Path, cc: Sequence[str], T: Any, seeds: Any, values: Any
+) -> tuple[Callable[[], int], Built]:
     """The C file in this process: all targets, and each function."""
     call = f"{name}_ik_at(T + 16 * i, values[i]," if arm.alone.stepped else f"{name}_ik(T + 16 * i,"
     (folder / "many.c").write_text(f"""#define {name.upper()}_IMPLEMENTATION
@@ -134,7 +137,7 @@ int many(const double *T, const double *seeds, const double *values, int n) {{
   return total;
 }}
 """)
-    gcc(folder, "-shared", "-fPIC", "-O2", "many.c", "-o", "many.so", "-lm")
+    compile_in(folder, cc, "-shared", "-fPIC", "many.c", "-o", "many.so", "-lm")
     library = ctypes.CDLL(str(folder / "many.so"))
     pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (T, seeds, values)]
     return lambda: int(library.many(*pointers, len(T))), Built(arm, name, library)
@@ -180,9 +183,9 @@ console.log(JSON.stringify([least / T.length, total]));
     return float(spent), int(total)
 
 
-def gcc(folder: Path, *arguments: str) -> None:
-    """Run the compiler in a folder."""
-    subprocess.run(["gcc", "-std=c99", "-w", *arguments], cwd=folder, check=True)
+def compile_in(folder: Path, cc: Sequence[str], *arguments: str) -> None:
+    """Run a compiler in a folder."""
+    subprocess.run([*cc, "-std=c99", "-w", *arguments], cwd=folder, check=True)
 
 
 def size(folder: Path, file: str) -> int:
@@ -211,7 +214,9 @@ def stack(graph: str, entry: str) -> int:
 def footprint(name: str, folder: Path, entry: str, *options: str) -> tuple[int, int]:
     """Bytes of machine code and of stack of the C file with ``-Os``."""
     define = f"-D{name.upper()}_IMPLEMENTATION"
-    gcc(folder, "-Os", "-fcallgraph-info=su", define, *options, "-c", f"{name}.c", "-o", f"{name}.o")
+    compile_in(
+        folder, ("gcc", "-Os", "-fcallgraph-info=su"), define, *options, "-c", f"{name}.c", "-o", f"{name}.o"
+    )
     return size(folder, f"{name}.o"), stack((folder / f"{name}.ci").read_text(), entry)
 
 
@@ -224,7 +229,7 @@ def without_floats(folder: Path) -> tuple[int, int]:
     return footprint(SOFT, folder, f"{SOFT}_ik", "-m32", "-msoft-float", *headers)
 
 
-def measured(robot: kin.Robot, folder: Path) -> tuple[Figures, list[Answers]]:
+def measured(robot: kin.Robot, folder: Path, cc: Sequence[str]) -> tuple[Figures, list[Answers]]:
     """The figures of an arm, and the answers to reachable and to hard targets.
 
     Raises:
@@ -237,7 +242,7 @@ def measured(robot: kin.Robot, folder: Path) -> tuple[Figures, list[Answers]]:
     texts = {"c": files.c_file(arm, name).encode(), "js": files.js_file(arm, name, "js").encode()}
     for language, text in texts.items():
         (folder / f"{name}.{language}").write_bytes(text)
-    many, built = in_c(arm, name, folder, T, seeds, values)
+    many, built = in_c(arm, name, folder, cc, T, seeds, values)
     in_c_, found = microseconds(many, len(T))
     in_js, also = in_javascript(arm, name, folder, T, seeds, values)
     if found != also:
@@ -268,13 +273,15 @@ def main() -> None:
     """Print the tables."""
     options = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     options.add_argument("robots", nargs="*", help="ids of arms; by default one of each family")
-    chosen = [ROBOTS[each] for each in options.parse_args().robots] or one_of_each()
+    options.add_argument("--cc", default="gcc -O2", help="compiler and options of the C that is timed")
+    given = options.parse_args()
+    chosen = [ROBOTS[each] for each in given.robots] or one_of_each()
     print("| arm, family | C | JavaScript | kernels | `solve_ik` | text of C | of JavaScript | code | stack |")
     print(9 * "|---" + "|")
     answers: list[str] = []
     for robot in chosen:
         with tempfile.TemporaryDirectory() as folder:
-            figures, found = measured(robot, Path(folder))
+            figures, found = measured(robot, Path(folder), shlex.split(given.cc))
         print(" | ".join([f"| {robot.id}, `{family_of(robot)}`", *figures.row()]) + " |", flush=True)
         answers.append(" | ".join([f"| {robot.id}", *found[0].row(), *found[1].row()]) + " |")
     print(f"\n{TARGETS} reachable targets, and {HARD} hard ones:\n")
