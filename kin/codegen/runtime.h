@@ -3,6 +3,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
+#if defined(__SSE2__) && defined(__x86_64__)
+#include <emmintrin.h>
+#endif
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "rows that do not exist are NaN: compile without -ffast-math and -ffinite-math-only"
@@ -37,14 +40,18 @@ static inline double most(double a, double b) { return b > a ? b : a; }
 static inline int64_t least_whole(int64_t a, int64_t b) { return b < a ? b : a; }
 static inline int64_t most_whole(int64_t a, int64_t b) { return b > a ? b : a; }
 static inline int64_t abs_whole(int64_t a) { return a < 0 ? -a : a; }
-static inline int64_t whole(double x) { return x >= -9223372036854775808.0 && x < 9223372036854775808.0 ? (int64_t)x : INT64_MIN; }
+#if defined(__SSE2__) && defined(__x86_64__) // one instruction: INT64_MIN for what does not fit
+static inline int64_t whole(double x) { return _mm_cvttsd_si64(_mm_set_sd(x)); }
+#else
+static inline int64_t whole(double x) { return fabs(x) < 9223372036854775808.0 ? (int64_t)x : INT64_MIN; }
+#endif
 static inline int64_t floor_whole(double x) { return whole(floor(x)); }
 static inline int64_t ceil_whole(double x) { return whole(ceil(x)); }
 static inline int64_t shift_left(int64_t a, int64_t n) { return n < 64 ? (int64_t)((uint64_t)a << n) : 0; }
 static inline int64_t bits_of(double x) { int64_t b; memcpy(&b, &x, sizeof b); return b; }
 static inline double float_of(int64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
 // Sine, cosine and arc tangent as kin.kernels.simd has them: no jumps, a dozen multiplications, at most 2.4 ulp off.
-#ifdef FP_FAST_FMA
+#if defined(FP_FAST_FMA) || defined(__FMA__) || defined(__ARM_FEATURE_FMA) // the first is not in clang
 KINBOARD_INLINE double fused(double a, double b, double c) { return fma(a, b, c); }
 #else
 KINBOARD_INLINE double fused(double a, double b, double c) { return a * b + c; }
