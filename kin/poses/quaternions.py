@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kin import transforms
 from kin.errors import InputError
@@ -36,9 +36,9 @@ def checked_wxyz(wxyz: ArrayLike, field: str = "wxyz") -> Array:
     return given
 
 
-def far_from_unit(wxyz: Array) -> Array:
+def far_from_unit(wxyz: Array) -> NDArray[np.bool_]:
     """Which quaternions ``(..., 4)`` `check_length` refuses, as booleans ``(...,)``."""
-    far: Array = ~(np.abs(np.linalg.norm(wxyz, axis=-1) - 1.0) <= UNIT)
+    far: NDArray[np.bool_] = ~(np.abs(np.linalg.norm(wxyz, axis=-1) - 1.0) <= UNIT)
     return far
 
 
