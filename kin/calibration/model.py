@@ -24,7 +24,7 @@ from kin.transforms import Array, finite_array
 _FINE = (math.radians(0.005), 0.1e-3)  # of an industrial arm: a reading, a contact in a socket
 _HOBBY_PLAY, _HOBBY_CONTACT = math.radians(0.3), 0.3e-3  # of an arm of hobby servos
 _PRINTED = 0.005
-_LEAST = 1e-6  # radians and metres: finer than any encoder or socket, and squares of it are still told from 0
+_LEAST = 1e-6  # radians and metres: finer than any encoder or socket, and squares of it still differ from 0
 _MOST = {
     "zero": math.radians(30.0),
     "length": 0.1,
