@@ -108,7 +108,7 @@ class Joint:
         lower, upper = finite_number(where, lower), finite_number(where, upper)
         if lower > upper:
             raise InputError(where, self.limits, "the lower limit first")
-        object.__setattr__(self, "limits", (lower, upper))
+        object.__setattr__(self, "limits", (lower + 0.0, upper + 0.0))  # [0.0, −0.0] runs backwards for NumPy
 
     def _check_following(self) -> None:
         if not isinstance(self.follows, str) or (self.follows and self.kind == "fixed"):

@@ -224,6 +224,8 @@ def test_random_configurations_are_inside_the_limits():
     assert robot.in_limits(q).all()
     assert robot.in_limits(robot.clip(q + 10)).all()
     assert not robot.in_limits(q + 10).any()
+    still = replace(robot, rows=(kin.Joint("a", limits=(0.0, -0.0)),), home=(0.0,))
+    assert still.random_q(np.random.default_rng(0)).tolist() == [0.0]
 
 
 def test_reach_bounds_every_pose_and_is_infinite_without_limits():
