@@ -312,6 +312,11 @@ class Scara4(ClosedForm):
         ranges = (arcs[:count],) if free else ()
         return Candidates(out[:, :n], out[:, n:], ranges, 0.0 if exists else max(gap, 0.0), obstacle)
 
+    def value_at(self, T: Array, q: Array) -> float:
+        """The tool's angle about the axes."""
+        g, turning = self.geometry, list(self.geometry.order[:3])
+        return wrap(float(g.sign[:3] @ q[turning] + g.offset[:3].sum()))
+
     def _elbow(self, q: Array) -> float:
         """θ2: 0 where the arm is straight."""
         g = self.geometry

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from kin.angles import wrap
 from kin.axes import is_zero
 from kin.robot import Robot
 from kin.solvers.canonical import free_last
@@ -106,6 +107,11 @@ class Parallel5(ClosedForm):
         g, psi = self.geometry, float(t[1] + t[2] + t[3])
         links = g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2])
         return float(g.a1 + links + g.p * math.cos(psi) - g.q * math.sin(psi))
+
+    def value_at(self, T: Array, q: Array) -> float:
+        """The pitch."""
+        t = self.geometry.sign * q + self.geometry.offset
+        return wrap(float(t[1] + t[2] + t[3]))
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of x and of s3."""

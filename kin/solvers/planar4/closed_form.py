@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.angles import TURN
+from kin.angles import TURN, wrap
 from kin.axes import frame_of, inverse, is_along, is_zero, lines_of, perpendicular_to
 from kin.fk import jacobian
 from kin.robot import Robot
@@ -116,6 +116,10 @@ class Planar4(ClosedForm):
             obstacle = Obstacle("point" if gap > 0.0 else "given joint values")
         values = np.column_stack([q[:, 3], out[:, 4]])
         return Candidates(q, values, (ranges, arcs[1, :second]), max(gap, 0.0) if obstacle else 0.0, obstacle)
+
+    def value_at(self, T: Array, q: Array) -> float:
+        """The direction of the third link."""
+        return wrap(float(self.params[SIGN : SIGN + 3] @ q[:3] + self.params[OFFSET : OFFSET + 3].sum()))
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the sign of s2."""

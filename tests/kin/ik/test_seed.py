@@ -10,8 +10,10 @@ import pytest
 import kin
 from kin.ik.options import IKOptions
 from kin.ik.table import Table
+from tests.kin.solvers.few import arm
 
 PI = np.pi
+PLANAR4 = arm("planar4", *[(0.0, 0.0, 0.3, 0.0)] * 4)
 # One arm of each family, and the arms on which formulas miss most.
 FEW = (
     "pioneer5",
@@ -124,3 +126,21 @@ def test_tables_leave_such_targets_to_results():
     table = Table.of(robot, T, IKOptions(), q)
     assert (table.kinds == -1).all()
     assert all(table.result(i).best.distance == 0.0 for i in range(8))
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "q"),
+    [
+        (PLANAR4, "pose", [0.8, -5e-4, -1.8, -0.4]),  # nearly straight: the value is at an end
+        (kin.get_robot("scara"), "position", [0.4, -3e-4, 0.1, 1.0]),
+        (kin.get_robot("so100"), "position", [0.3, 0.4, -0.2, 0.5, 0.2]),
+    ],
+    ids=["planar4", "scara", "so100"],
+)
+def test_the_redundancy_value_of_a_seed_is_its_own(robot, task, q):
+    T = kin.fk(robot, q)
+    said = kin.solve_ik(robot, T, q_seed=q, task=task).best
+    assert said.distance == 0.0
+    values = {each.name: each.value for each in said.redundancy}
+    again = kin.solve_ik(robot, T, task=task, redundancy=values)
+    assert min(np.abs(each.q - q).max() for each in again.solutions) < 1e-8
