@@ -25,7 +25,7 @@ from app.api.workspace.streaming import ComputedResponse
 from app.exports.motion import FORMATS
 from app.exports.motion_samples import with_joint_names
 from app.shared.answers.motion import MotionAnswer, motion_answer
-from app.shared.problems import FieldError, from_input_error
+from app.shared.problems import FieldError
 from app.shared.settings import Settings
 from kin import InputError, Robot, plan_motion
 from kin.motion import Motion, program_from_dict
@@ -163,8 +163,8 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
             ("qdd_start", body.qdd_start),
         )
     )
+    frames = {name: body.constant_frames[f"workpieces.{name}"][0] for name in body.workpieces}
     try:
-        frames = {name: body.constant_frames[f"workpieces.{name}"][0] for name in body.workpieces}
         program = program_from_dict(body.program, robot, frames)
         found = plan_motion(
             robot,
@@ -176,37 +176,21 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
             **body.keywords,
         )
     except InputError as error:
-        prefix = (
-            "" if error.field.partition("[")[0] in ("program", "q_start", "qd_start", "qdd_start") else "program."
-        )
-        raise invalid(from_input_error(error, prefix)) from None
+        known = error.field.partition("[")[0] in ("program", "q_start", "qd_start", "qdd_start")
+        raise (error if known else error.within("program")) from None
     if found.driven is not None:
         _check_length(found.driven, body.rate)
     if body.format == "json" or not found.planned:
         return _whole(found, body, deadline)
     if body.joint_names is not None:
-        try:
-            found = with_joint_names(found, body.joint_names, "joint_names")
-        except InputError as error:
-            raise invalid(from_input_error(error)) from None
-    if body.format not in ("urscript", "python"):
-        _check_format(body.format)
-        return found
+        found = with_joint_names(found, body.joint_names, "joint_names")
     kind = FORMATS[body.format]
-    try:
-        text = b"".join(kind.pieces(found, body.rate))
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
+    if body.format not in ("urscript", "python"):
+        kind.check()  # before the answer begins
+        return found
+    text = b"".join(kind.pieces(found, body.rate))
     headers = {"content-disposition": f'attachment; filename="{robot.id}-motion{kind.suffix}"'}
     return Response(text, media_type=kind.media_type, headers=headers)
-
-
-def _check_format(name: str) -> None:
-    """Refuse a format whose optional package is not installed, before the answer begins."""
-    try:
-        FORMATS[name].check()
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
 
 
 def _check_length(found: Motion, rate: float) -> None:

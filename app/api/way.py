@@ -11,11 +11,9 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import AvoidingBody
-from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
 from app.shared.answers.way import WayAnswer, way_answer
-from app.shared.problems import from_input_error
 from app.shared.settings import Settings
 from kin import InputError, Robot
 from kin.transforms import Array
@@ -77,7 +75,7 @@ def _find(robot: Robot, body: WayRequest, settings: Settings, deadline: Deadline
     start, end = read(body.q_start, "q_start"), read(body.q_goal, "q_goal")
     goal = body.T_goal if end is None else end
     if goal is None or (end is not None and body.T_goal is not None):
-        raise invalid(from_input_error(InputError("q_goal", body.q_goal, "q_goal or T_goal, one of them")))
+        raise InputError("q_goal", body.q_goal, "q_goal or T_goal, one of them")
     try:
         found = find_way(
             robot,
@@ -90,7 +88,5 @@ def _find(robot: Robot, body: WayRequest, settings: Settings, deadline: Deadline
         )
         motion = way_program(found, cancel=deadline.check, **body.keywords) if found.found else None
     except InputError as error:
-        if error.field == "goal":
-            error.field = "T_goal"
-        raise invalid(from_input_error(error)) from None
+        raise (error.renamed("T_goal") if error.field == "goal" else error) from None
     return reply(way_answer(found, motion))

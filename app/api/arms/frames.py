@@ -11,7 +11,7 @@ from pydantic import Field, field_validator
 from app.api import schemas
 from app.api.problems import invalid
 from app.api.schemas import Vector3, Vector4, numbers
-from app.shared.problems import FieldError, from_input_error, show
+from app.shared.problems import FieldError, show
 from kin import InputError, Robot, frame_pose
 from kin.frames import BASE, FRAMES, TOOL, matrix_of
 from kin.ik.options import MOST_METRES
@@ -40,17 +40,14 @@ class ConstantFrame(schemas.Body):
     def resolve(self, field: str) -> tuple[Array, float]:
         """The transform ``(4, 4)``, and how rounded its matrix is, as `kin.ik.problem.read_pose` says it.
 
-        Raises 422 naming `field`.
+        Raises `InputError` naming `field`.
         """
-        try:
-            if self.matrix is None:
-                zero = [0.0, 0.0, 0.0]
-                return np.array(matrix_of(self.xyz or zero, self.rpy or zero)), 0.0
-            if self.xyz is not None or self.rpy is not None:
-                raise InputError(f"{field}.matrix", "a matrix besides xyz or rpy", "one of the two")
-            return read_pose(self.matrix, POSE, f"{field}.matrix", always=True)
-        except InputError as error:
-            raise invalid(from_input_error(error)) from None
+        if self.matrix is None:
+            zero = [0.0, 0.0, 0.0]
+            return np.array(matrix_of(self.xyz or zero, self.rpy or zero)), 0.0
+        if self.xyz is not None or self.rpy is not None:
+            raise InputError(f"{field}.matrix", "a matrix besides xyz or rpy", "one of the two")
+        return read_pose(self.matrix, POSE, f"{field}.matrix", always=True)
 
 
 class FramesBody(schemas.Body):

@@ -14,7 +14,7 @@ from app.api.problems import field_error, invalid
 from app.api.schemas import LARGEST, Body
 from app.shared.clouds import Cloud
 from app.shared.options import declared
-from app.shared.problems import FieldError, from_input_error, show
+from app.shared.problems import FieldError, show
 from app.shared.settings import Settings
 from kin import InputError, JointConstraints, Robot
 from kin.ik.options import WiderLimits
@@ -190,8 +190,6 @@ def validated(model: type[_Model], given: object, place: str) -> _Model:
     except ValidationError as error:
         items = [{**item, "loc": (place, *item["loc"])} for item in error.errors()]
         raise invalid(*map(field_error, items)) from None
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
 
 
 def _is_list(annotation: Any) -> bool:
