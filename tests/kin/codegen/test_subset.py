@@ -20,7 +20,7 @@ from kin.codegen.types import FLOAT, ArrayOf
 from kin.codegen.typing import Program
 
 KINDS = FLOAT, FLOAT, ArrayOf(FLOAT, 1)
-ARGUMENTS = ((3.0, 2.0), (-2.5, 7.25), (0.0, -1.0), (4.5, 0.5))
+ARGUMENTS = ((3.0, 2.0), (-2.75, 7.75), (0.0, -1.0), (4.5, 0.5))
 FIRST = (1.0, 2.0, 3.0, 4.0)
 
 
