@@ -167,9 +167,9 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         return ghosts(f.robot, f.settings.postures, f.shown, lambda i: self.event(self.on_posture, i))
 
     def running(self) -> Sequence[Work | Sweep]:
-        s, summaries, works = self.settings, self.stage.summaries, list[Work | Sweep]()
+        s, works = self.settings, list[Work | Sweep]()
         if s.request is not None:
-            works.append(Work("map", summaries.postures, (s.request,), poll=POLL))
+            works.append(Work("map", self.stage.summaries.postures, (s.request,), poll=POLL))
         if s.judged is not None:
             works.append(Work("cuspidal", self._judge, (self.facts.robot, s.judged)))
         if s.loop is not None:
