@@ -20,7 +20,6 @@ from typing import NamedTuple, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kin.differential.task import task_rows
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.branches import candidates_of
@@ -31,14 +30,13 @@ from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
-from kin.solvers.contract import APPROACH, Candidates, ClosedForm, Many, One
+from kin.solvers.contract import Candidates, ClosedForm, Many, One
 from kin.solvers.locked import named_form_of
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
 _AT_ONCE = 1024  # targets of one compiled call
 _CACHE = "_batch"
-_SINGULAR = 1e-5  # smallest singular values of configurations that may be on a curve
 _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 
 
@@ -227,32 +225,17 @@ class _Stack:
         q = np.empty((len(rows), self.prepared.robot.n))
         every = np.stack([self.found[i].q for i in rows])
         nearest_rows(self.prepared.requirement, T, seeds, every, q)
-        return _regular(self.prepared, every, q)
+        # What such a target leaves free has a better value than that of the branches: it is searched for.
+        searched = list(self.prepared.searched)
+        q[[not np.isnan(self.found[i].values[:, searched]).all() for i in rows]] = math.nan
+        return q
 
 
 def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Array:
-    """The best solution of each target ``(k, n)``: the branch that is clearly the nearest, or one of all rows."""
-    q = np.full((len(T), prepared.robot.n), math.nan)
-    if form.nearest_many(T, seeds, prepared.lower, prepared.upper, q):
-        nearest_rows(prepared.requirement, T, seeds, q[:, None].copy(), q)
-    rest = np.flatnonzero(np.isnan(q[:, 0]))
-    if len(rest):
-        T, near, found = T[rest], seeds if len(seeds) == 1 else seeds[rest], np.empty((len(rest), q.shape[1]))
-        rows = np.empty((len(rest), len(form.branches), q.shape[1]))
-        form.solve_many(T, near, prepared.lower, prepared.upper, rows)
-        nearest_rows(prepared.requirement, T, near, rows, found)
-        q[rest] = _regular(prepared, rows, found)
-    return q
-
-
-def _regular(prepared: IKProblem, rows: Array, q: Array) -> Array:
-    """q ``(k, n)``, in place NaN where one of all rows ``(k, m, n)`` is singular: the nearest is searched for."""
-    if not prepared.searched:
-        return q
-    there = np.argwhere(~np.isnan(rows[..., 0]))
-    J = task_rows(prepared.robot, rows[tuple(there.T)], "approach" if prepared.code == APPROACH else "pose")
-    J[:, :3] /= prepared.unit
-    q[there[np.linalg.svd(J, compute_uv=False)[:, -1] < _SINGULAR, 0]] = math.nan
+    """The best solution of each target ``(k, n)``, of all its branches."""
+    q, rows = np.empty((len(T), prepared.robot.n)), np.empty((len(T), len(form.branches), prepared.robot.n))
+    form.solve_many(T, seeds, prepared.lower, prepared.upper, rows)
+    nearest_rows(prepared.requirement, T, seeds, rows, q)
     return q
 
 

@@ -115,7 +115,8 @@ def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Fl
     closest = nearest.closest(problem, branches.q)
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
-    order = by_key(branches.q, rows, branches.stats[:, OVERRUN])
+    # Rounding must not decide between postures that are equally far outside.
+    order = by_key(branches.q, rows, branches.stats[:, OVERRUN].round(12))
     blocked = _blocked(problem, branches.q, order, range(len(branches.q)))
     redundancy = with_further(branches, redundancy_of(problem, branches, order[:1], rows)[1])
     names = [parameter.name for parameter in problem.requested]

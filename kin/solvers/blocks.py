@@ -7,15 +7,11 @@ target is then a loop along the rows of S, without jumps and calls, several targ
    no branch, one of the two is NaN; a target near a singularity is marked by 1.0 in the last row.
 2. *angles*: the arc tangents of all pairs, which are most of the work, and joint values of them.
 3. *store*: the rows of the answer, gathered from S.
-4. *careful*: a marked target once more, by the kernel that limits and ranges are computed with, too.
+4. *careful*: a marked target once more, by the kernel that also chooses what is free there, inside the limits.
 
 One target is a block of one, the same operations in the same order: so results of a batch and of single
-targets are bit-identical.
-
-`nearest_each` picks, among the rows of a block, the branch that is nearest to a seed inside the limits, and has
-only that one computed by the careful kernel. Both kernels give the same angles but for rounding, so the choice is
-the same too, unless two branches are equally near, the nearest one is at a limit, or the target is marked: such a
-target is left open.
+targets are bit-identical. Where a target that is not marked leaves nothing free, neither seed nor limits count, so
+that what is solved inside limits (`solved`, `solved_many`) is computed in the same way.
 """
 
 from __future__ import annotations
@@ -29,19 +25,18 @@ from kin.angles import TURN
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.fk import BLOCK, all_finite_pose
 from kin.kernels.simd import atan2, rounded, widest, wrapped
-from kin.solvers.common import HIGH, LOW, NEAR
+from kin.solvers.common import UNBOUNDED, clear
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _REACH = TOLERANCES.closure_position * 0.1
 # Metres beyond the reach of an elbow or a shoulder up to which the careful kernel decides.
 BEYOND = 10.0 * _REACH
-# Sine of a singular angle, or metres, below which the careful kernel computes: farther off, rows of both kernels
-# differ by far less than `_CLEAR`.
-NEARLY = 1e-6
-# Radians, or square radians, by which a choice among branches must be clear.
-_CLEAR = 1e-6
-_PER_TURN = 1.0 / TURN
+# Sine of a singular angle, or metres, below which the careful kernel computes: there, rounding is amplified, and
+# rows of both kernels would differ by 1e-11 and more.
+NEARLY = 1e-4
+# The same for an elbow: the square of half its angle, or of half of what it lacks of a half turn.
+_STRAIGHT = 1e-8
 # Rows of S: the first three rows of the pose, the requested value, a family's own from OWN on, and last the mark.
 VALUE, OWN, _MARK = 12, 13, -1
 
@@ -49,8 +44,8 @@ Pairs = Callable[[Array, Array, int, Array], int]
 Arc = Callable[[Array, int, int, int], float]
 Angles = Callable[[Arc, Array, Array, int, Array], None]
 Store = Callable[[Array, Array, int, Array], None]
-Careful = Callable[[Array, Array, float, Array, Array], None]
-Alone = Callable[[Array, Array, tuple[float, int], Array, Array, Array], object]
+# Of params, T, value, seed, lower, upper, arcs, out: gap in metres, and number of arcs, −1 if nothing is free.
+Careful = Callable[[Array, Array, float, Array, Array, Array, Array, Array], tuple[float, int]]
 Entries = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 
 
@@ -75,18 +70,34 @@ def solve_each(
 
 
 @joined
+def in_turn(
+    one: Callable[[Array, Array, float, Array, Array], bool], params: Array, T: Array, values: Array, near: Array,
+    out: Array,
+) -> None:  # fmt: skip
+    """out ``(N, branches, n)`` ← what a kernel finds of each of the targets T ``(N, 4, 4)``, one after another.
+
+    For families without lanes. values: one for each ``(N,)``, or one for all ``(1,)``.
+    """
+    last = values.shape[0] - 1
+    for i in range(T.shape[0]):
+        one(params, T[i], values[min(i, last)], near, out[i])
+
+
+@joined
 def each(
-    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
-    request: tuple[Array, Array], out: Array,
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, bool], params: Array,
+    T: Array, request: tuple[Array, Array, Array, Array], out: Array,
 ) -> None:  # fmt: skip
     """out ``(N, branches, n)`` ← all branches of each of the targets T ``(N, 4, 4)``.
 
-    layout: as in `one`. request: a value for each target ``(N,)``, or one for all ``(1,)``; the configuration
-    ``(n,)`` to stay near.
+    layout: how many rows S has, and whether what a target leaves free is chosen; else its branches are NaN.
+    request: a value for each target ``(N,)``, or one for all ``(1,)``; configurations to stay near, ``(N, n)`` or
+    ``(1, n)``, the first of them for `pairs` and `angles`; lower and upper limits ``(n,)``.
     """
-    values, near = request
-    S = np.empty((layout[0], BLOCK))
-    last = values.shape[0] - 1
+    values, seeds, lower, upper = request
+    rows, chosen = layout
+    S, arcs = np.empty((rows, BLOCK)), np.empty((0, 3))
+    last, last_seed = values.shape[0] - 1, seeds.shape[0] - 1
     for first in range(0, T.shape[0], BLOCK):
         count = min(BLOCK, T.shape[0] - first)
         for b in range(count):
@@ -94,23 +105,26 @@ def each(
                 for c in range(4):
                     S[4 * r + c, b] = T[first + b, r, c]
             S[VALUE, b] = values[min(first + b, last)]
-        marked = pairs(params, near, count, S)
-        angles(arc, params, near, count, S)
+        marked = pairs(params, seeds[0], count, S)
+        angles(arc, params, seeds[0], count, S)
         for b in range(count):
             store(params, S, b, out[first + b])
         if marked > 0:
             for b in range(count):
                 if S[_MARK, b] > 0.0:
                     i = first + b
-                    careful(params, T[i], values[min(i, last)], near, out[i])
+                    value, near = values[min(i, last)], seeds[min(i, last_seed)]
+                    _, free = careful(params, T[i], value, near, lower, upper, arcs, out[i])
+                    if free >= 0 and not chosen:
+                        clear(out[i])
 
 
 @joined
-def one(
-    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
+def regular(
+    pairs: Pairs, angles: Angles, store: Store, layout: tuple[int, int], params: Array, T: Array,
     request: tuple[float, Array], out: Array,
 ) -> bool:  # fmt: skip
-    """out ``(branches, n)`` ← all branches of T ``(4, 4)``. False if T is not finite.
+    """out ``(branches, n)`` ← all branches of T ``(4, 4)``; False, and out as it was, if it is marked.
 
     layout: how many rows S has, and how many pairs there are: S[OWN + k], S[OWN + pairs + k]. request: the value,
     and the configuration ``(n,)`` to stay near.
@@ -123,116 +137,89 @@ def one(
             S[4 * r + c, 0] = T[r, c]
     S[VALUE, 0] = value
     if pairs(params, near, S.shape[1], S) > 0:
-        careful(params, T, value, near, out)
-    else:
-        # Vectors go down the one column: all arc tangents in one loop.
-        for k in range(OWN, OWN + size):
-            S[k, 0] = atan2(S[k, 0], S[size + k, 0])
-        angles(taken, params, near, S.shape[1], S)
-        store(params, S, 0, out)
+        return False
+    # Vectors go down the one column: all arc tangents in one loop.
+    for k in range(OWN, OWN + size):
+        S[k, 0] = atan2(S[k, 0], S[size + k, 0])
+    angles(taken, params, near, S.shape[1], S)
+    store(params, S, 0, out)
+    return True
+
+
+@joined
+def one(
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
+    request: tuple[float, Array], out: Array,
+) -> bool:  # fmt: skip
+    """out ``(branches, n)`` ← all branches of T ``(4, 4)``, without limits. False if T is not finite.
+
+    layout, request: as in `regular`.
+    """
+    value, near = request
+    if not regular(pairs, angles, store, layout, params, T, request, out):
+        limits = unbounded(near.shape[0])
+        careful(params, T, value, near, limits[0], limits[1], out[:0], out)
     return all_finite_pose(T)
 
 
 @joined
-def nearest_each(
-    pairs: Pairs, angles: Angles, store: Store, alone: Alone, layout: tuple[int, int], params: Array, T: Array,
+def many(
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, rows: int, params: Array, T: Array,
+    request: tuple[Array, Array], out: Array,
+) -> None:  # fmt: skip
+    """out ``(N, branches, n)`` ← all branches of each of the targets T ``(N, 4, 4)``, without limits.
+
+    request: a value for each target ``(N,)``, or one for all ``(1,)``; the configuration ``(n,)`` to stay near.
+    """
+    values, near = request
+    limits = unbounded(near.shape[0])
+    around = (values, near.reshape((1, near.shape[0])), limits[0], limits[1])
+    each(pairs, angles, store, careful, (rows, True), params, T, around, out)
+
+
+@joined
+def solved(
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
+    request: tuple[float, Array, Array, Array, Array], out: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """out ``(branches, ≥ n)`` ← all branches of T ``(4, 4)`` inside limits: (gap in metres, number of arcs).
+
+    layout: as in `regular`. request: the value, the seed, lower and upper limits ``(n,)``, and where the arcs
+    go. Further columns are NaN where the target is regular.
+    """
+    value, near, lower, upper, arcs = request
+    if regular(pairs, angles, store, layout, params, T, (value, near), out):
+        reached = False
+        for i in range(out.shape[0]):
+            reached = reached or not math.isnan(out[i, 0])
+            for j in range(near.shape[0], out.shape[1]):
+                out[i, j] = math.nan
+        if reached:
+            return 0.0, -1
+    return careful(params, T, value, near, lower, upper, arcs, out)
+
+
+@joined
+def solved_many(
+    pairs: Pairs, angles: Angles, store: Store, careful: Careful, rows: int, params: Array, T: Array,
     around: tuple[Array, Array, Array], out: Array,
 ) -> None:  # fmt: skip
-    """out ``(N, n)`` ← of the branches of each target T ``(N, 4, 4)`` the nearest one inside the limits, or NaN.
+    """out ``(N, branches, n)`` ← what `solved` finds of each of T ``(N, 4, 4)``, NaN where something is free.
 
-    All joints turn. NaN where there is none, or where the choice is not clear. around: seeds
-    ``(N, n)``, or ``(1, n)`` for all, and lower and upper limits ``(n,)``.
-
-    Args:
-        alone: ``alone(params, T, (NaN, branch), box, arcs, rows)`` writes ``rows[branch]`` as the careful kernel
-            does, nothing if there is no such branch. Of a target that is not marked it reads no seed and no limit:
-            box ``(4, n)`` is NaN, arcs ``(1, 3)``.
-        layout: how many rows S has, how many columns rows has.
+    around: seeds ``(N, n)``, or ``(1, n)`` for all, and lower and upper limits ``(n,)``.
     """
     seeds, lower, upper = around
-    n, last = out.shape[1], seeds.shape[0] - 1
-    S, rows, arcs = np.empty((layout[0], BLOCK)), np.empty((8, layout[1])), np.empty((1, 3))
-    box = np.full((4, n), math.nan)
-    found, tiled, cost = np.empty((8, n)), np.empty((3, 8 * n)), np.empty(8 * n)
-    flat = found.reshape(8 * n)
-    laid, inside = -1, False
-    for first in range(0, T.shape[0], BLOCK):
-        count = min(BLOCK, T.shape[0] - first)
-        for b in range(count):
-            for r in range(3):
-                for c in range(4):
-                    S[4 * r + c, b] = T[first + b, r, c]
-            S[VALUE, b] = math.nan
-        pairs(params, seeds[0], count, S)
-        angles(arc, params, seeds[0], count, S)
-        for b in range(count):
-            i = first + b
-            which = min(i, last)
-            if which != laid:
-                laid, inside = which, _tile(seeds[which], lower, upper, tiled)
-            branch = -1
-            if inside and S[_MARK, b] == 0.0:
-                store(params, S, b, found)
-                branch = _nearest_branch(flat, tiled, cost)
-            if branch >= 0:
-                rows[branch, 0] = math.nan
-                alone(params, T[i], (math.nan, branch), box, arcs, rows)
-            for c in range(n):
-                out[i, c] = rows[branch, c] if branch >= 0 else math.nan
+    request = (np.full(1, math.nan), seeds, lower, upper)
+    each(pairs, angles, store, careful, (rows, False), params, T, request, out)
 
 
 @jit
-def _tile(seed: Array, lower: Array, upper: Array, around: Array) -> bool:
-    """Rows NEAR, LOW, HIGH of around ``(3, 8 n)`` ← seed and limits ``(n,)``, once for each branch.
-
-    Whether the seed is inside the limits: from outside, the nearest image may be several turns away.
-    """
-    n = seed.shape[0]
-    inside = True
+def unbounded(n: int) -> Array:
+    """Lower and upper limits ``(2, n)`` that never bind."""
+    limits = np.empty((2, n))
     for i in range(n):
-        inside = inside and lower[i] <= seed[i] <= upper[i]
-        for k in range(i, 8 * n, n):
-            around[NEAR, k], around[LOW, k], around[HIGH, k] = seed[i], lower[i], upper[i]
-    return inside
-
-
-@jit
-def _nearest_branch(q: Array, around: Array, cost: Array) -> int:
-    """The branch of q ``(8 n,)``, n angles of each, that is nearest to the seed inside the limits; −1 if unclear.
-
-    A branch that does not exist is NaN. Angles are brought to their best images, in place. Those at a limit count
-    as inside, and so no branch is farther than it is taken for; cost ``(8 n,)`` is scratch.
-    """
-    widest()
-    for k in range(cost.shape[0]):
-        near, low, high = around[NEAR, k], around[LOW, k], around[HIGH, k]
-        x = q[k] + TURN * rounded((near - q[k]) * _PER_TURN)
-        x = x + TURN if x < low - _CLEAR else (x - TURN if x > high + _CLEAR else x)
-        outside = (x < low - _CLEAR) | (x > high + _CLEAR)
-        q[k] = x
-        cost[k] = math.inf if outside else (x - near) * (x - near)
-    n = cost.shape[0] // 8
-    best, least, second = -1, math.inf, math.inf
-    for branch in range(8):
-        total = 0.0
-        for k in range(branch * n, branch * n + n):
-            total += cost[k]
-        if total < least:
-            best, least, second = branch, total, least
-        elif total < second:
-            second = total
-    if not second - least > _CLEAR:
-        return -1
-    for k in range(best * n, best * n + n):
-        if q[k] - around[LOW, k] < _CLEAR or around[HIGH, k] - q[k] < _CLEAR:
-            return -1
-    return best
-
-
-@inlined
-def is_wanted(only: int, branch: int, bits: int) -> bool:
-    """Whether a branch is to be computed: `only` is negative, or has the same ones of these bits."""
-    return only < 0 or (only ^ branch) & bits == 0
+        limits[0, i], limits[1, i] = -UNBOUNDED, UNBOUNDED
+    return limits
 
 
 @inlined
@@ -288,7 +275,7 @@ def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, floa
     half = 0.5 / (a * b)
     s = half * math.sqrt(far * near_by)
     c = 0.5 * half * (near_by - far)
-    close = (far < 1e-14 * near_by) | (near_by < 1e-14 * far) | (1e-8 * most * most > D2)
+    close = (far < _STRAIGHT * near_by) | (near_by < _STRAIGHT * far) | (1e-8 * most * most > D2)
     return c if reached else math.nan, s, 1.0 / D2, close & nearly_reached
 
 

@@ -235,7 +235,8 @@ class ClosedForm(ABC):
         """q ``(N, branches, n)`` ← what `solve` finds of many targets ``(N, 4, 4)``, with no value requested.
 
         Bit-identical, in one compiled call. They are of a `quick` task. Rows may be NaN that are farther from the
-        seed than another one inside the limits, and all rows of a target where `solve` may miss some.
+        seed than another one inside the limits, and all rows of a target where `solve` may miss some, or that
+        leaves a rare redundancy parameter free.
 
         Args:
             seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.
@@ -244,15 +245,6 @@ class ClosedForm(ABC):
         if self.kernels.seeded is None:
             raise NotImplementedError(f"{self.name} is quick for no task")
         self.kernels.seeded(self.kernels.params, T, seeds, lower, upper, q)
-
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """q ``(N, n)`` ← the row of `solve_many` nearest to the seed inside the limits, in less time; or NaN.
-
-        NaN where there is none, or where all rows are needed to choose one. Arguments as for `solve_many`; the
-        angles may be whole turns away from the nearest ones. False, and q as it was, for a family without a
-        kernel that takes less time.
-        """
-        return False
 
     def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
         """Of the rows of `kernels.many` at targets ``(N, 4, 4)`` and values ``(N,)`` one of each ``(N, n)``.

@@ -169,13 +169,6 @@ class ReversedJoints(WrappedForm):
         self.form.solve_many(T, seeds * self.signs, *self._limits(lower, upper), q)
         q *= self.signs
 
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """Of many targets the branch nearest to the seed."""
-        found = self.form.nearest_many(T, seeds * self.signs, *self._limits(lower, upper), q)
-        if found:
-            q *= self.signs
-        return found
-
     def _limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Joint limits of the family's arm."""
         reversed_ = self.signs < 0.0

@@ -141,14 +141,6 @@ class Scaled(WrappedForm):
         self.form.solve_many(self._target(T), seeds / metres, lower / metres, upper / metres, q)
         q *= metres
 
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """Of many targets the branch nearest to the seed."""
-        metres = self.metres
-        found = self.form.nearest_many(self._target(T), seeds / metres, lower / metres, upper / metres, q)
-        if found:
-            q *= metres
-        return found
-
     def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
         """One branch at each value."""
         (each,) = self._sizes(self.form.redundancies(POSE)[:1])

@@ -25,9 +25,9 @@ from kin.axes import frame_of, is_along, is_zero, lines_of, perpendicular_to
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
-from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single, solve_each
+from kin.solvers.blocks import OWN, Arc, double, elbow_of, in_base, many, one, rows_of, single, solved, solved_many
 from kin.solvers.canonical import pose_params, signed_box
-from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, split_sum
+from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -51,9 +51,8 @@ _PSI = RedundancyParameter("psi", "tool angle ψ", circular=True)
 _REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 # Layout of the parameter array: base⁻¹ and the tool, see `kin.solvers.planar`; the two links; for θ1, θ2, θ3 and
-# the height the index of the joint (−1: none), its sign and offset; joint limits that never bind; whether the tool
-# is upright.
-_A, _B, _JOINT, _SIGN, _OFFSET, _LOW, _HIGH, _UPRIGHT = LINKS, LINKS + 1, 26, 30, 34, 38, 42, 46
+# the height the index of the joint (−1: none), its sign and offset; whether the tool is upright.
+_A, _B, _JOINT, _SIGN, _OFFSET, _UPRIGHT = LINKS, LINKS + 1, 26, 30, 34, 38
 
 
 class Geometry(NamedTuple):
@@ -99,9 +98,8 @@ def match(robot: Robot) -> Scara4 | None:
     tool = np.linalg.inv(wrist) @ lines.T_base_tool
     upright = is_along(tool)
     lengths, joints = [abs(upper), abs(fore)], [*order, *[-1] * (4 - robot.n)]
-    limits = [*[-UNBOUNDED] * 4, *[UNBOUNDED] * 4]
     pose = [*pose_params(base, np.eye(4))[:TOOL], *tool[:3].ravel()]
-    params = np.array([*pose, *lengths, *joints, *sign, *offset, *limits, float(upright)])
+    params = np.array([*pose, *lengths, *joints, *sign, *offset, float(upright)])
     return Scara4(Geometry(params, order, sign, offset, abs(upper), abs(fore), upright), robot)
 
 
@@ -123,7 +121,7 @@ def _box(params: Array, near: Array, lower: Array, upper: Array) -> Array:
     for i in range(3):
         k = int(params[_JOINT + i])
         a[i], b[i], c[i] = near[k], lower[k], upper[k]
-    signed_box(a, b, c, params[_SIGN:_OFFSET], params[_OFFSET:_LOW], box)
+    signed_box(a, b, c, params[_SIGN:_OFFSET], params[_OFFSET:_UPRIGHT], box)
     return box
 
 
@@ -132,7 +130,7 @@ def _branches(
     params: Array, T: Array, request: tuple[int, float], near: Array, lower: Array, upper: Array, arcs: Array,
     out: Array,
 ) -> tuple[float, int]:  # fmt: skip
-    """out ``(2, n)`` ← both branches: (gap in metres, number of arcs of ψ).
+    """out ``(2, n)`` ← both branches: (gap in metres, number of arcs of ψ or −1 if it is fixed).
 
     request: the task, and a value of ψ, which is free for a point, and for an approach direction along the axes.
     It is then that value, or near the seed's if that is NaN, and out has one column more for it.
@@ -160,7 +158,7 @@ def _branches(
     cx, cy = x - p * c + q * s, y - p * s - q * c
     miss, bend, _, k1, k2 = two_links(cx, cy, a, b)
     if miss > _REACH:
-        return miss, 0
+        return miss, -1
     middle, half = math.atan2(cy, cx), math.atan2(k2, k1)
     for ei in range(2 if bend > 0.0 else 1):
         up = 1.0 if ei == 0 else -1.0
@@ -173,7 +171,7 @@ def _branches(
         _put(params, out, ei, t1, t2, psi - t1 - t2, z)
     if bend == 0.0:
         copy_row(out, 0, 1)
-    return miss, 0
+    return miss, -1
 
 
 # Batch kernels: both branches of a pose, without limits, ranges or a choice, see :mod:`kin.solvers.blocks`. Rows
@@ -243,9 +241,11 @@ def _store(params: Array, S: Array, b: int, out: Array) -> None:
 
 
 @jit
-def _careful(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(2, n)`` ← the branches by `_branches`, which also handles singular targets."""
-    _branches(params, T, (POSE, value), near, params[_LOW:_HIGH], params[_HIGH:_UPRIGHT], out[:0], out)
+def _careful(
+    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `_branches`, which also handles singular targets, for a pose."""
+    return _branches(params, T, (POSE, value), near, lower, upper, arcs, out)
 
 
 @jit
@@ -258,16 +258,26 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    each(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, (values, near), out)
+    many(_pairs, _angles, _store, _careful, _ROWS, params, T, (values, near), out)
+
+
+@jit
+def _solve_one(
+    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `_careful`, which is called where T ``(4, 4)`` is singular."""
+    request = (value, near, lower, upper, arcs)
+    return solved(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, request, out)
 
 
 @jit
 def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 2, n)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `_branches` finds them.
+    """out ``(N, 2, n)`` ← what `_solve_one` finds of each of the poses T ``(N, 4, 4)``.
 
     seeds ``(N, n)``, or ``(1, n)`` for all; lower, upper ``(n,)``: joint limits.
     """
-    solve_each(_branches, (POSE, math.nan), (0, out.shape[2]), params, T, seeds, (lower, upper), out)
+    widest()
+    solved_many(_pairs, _angles, _store, _careful, _ROWS, params, T, (seeds, lower, upper), out)
 
 
 class Scara4(ClosedForm):
@@ -306,7 +316,10 @@ class Scara4(ClosedForm):
         out, arcs = np.empty((2, n + free)), np.empty((64, 3))
         value = problem.values[0] if free else math.nan
         p = problem
-        gap, count = _branches(g.params, p.T, (p.task, value), p.seed, p.lower, p.upper, arcs, out)
+        if p.task == POSE:
+            gap, count = _solve_one(g.params, p.T, value, p.seed, p.lower, p.upper, arcs, out)
+        else:
+            gap, count = _branches(g.params, p.T, (p.task, value), p.seed, p.lower, p.upper, arcs, out)
         exists = bool((~np.isnan(out[:, 0])).any())
         obstacle = None if exists else Obstacle("last axis beyond the links' reach")
         ranges = (arcs[:count],) if free else ()

@@ -21,7 +21,7 @@ from kin.axes import is_perpendicular, is_zero, links_of, screw_x, screw_z
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
 from kin.robot import Robot
-from kin.solvers.blocks import Arc, Entries, each, one
+from kin.solvers.blocks import Arc, Entries, many, one, solved, solved_many
 from kin.solvers.contract import Obstacle
 from kin.solvers.names import Names, Part, eight, front_or_back, names_of
 from kin.solvers.singular import JointValue, Singularity, off_line, those_within
@@ -35,10 +35,10 @@ from kin.solvers.wrist6.batch import (
     all_but_third,
     arm_pairs,
     both_sides,
-    careful,
     store,
     turned,
 )
+from kin.solvers.wrist6.branches import solve
 from kin.solvers.wrist6.closed_form import Wrist6
 from kin.solvers.wrist6.geometry import OFFSET, SIGN, Geometry, has_spherical_wrist, pack
 from kin.tolerances import TOLERANCES
@@ -124,14 +124,33 @@ def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    return one(_pairs, _angles, store, careful, (_ROWS, PAIRS), params, T, (value, near), out)
+    return one(_pairs, _angles, store, solve, (_ROWS, PAIRS), params, T, (value, near), out)
 
 
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    each(_pairs, _angles, store, careful, (_ROWS, PAIRS), params, T, (values, near), out)
+    many(_pairs, _angles, store, solve, _ROWS, params, T, (values, near), out)
+
+
+@jit
+def solve_one(
+    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `solve`, which is called where T ``(4, 4)`` is singular."""
+    request = (value, near, lower, upper, arcs)
+    return solved(_pairs, _angles, store, solve, (_ROWS, PAIRS), params, T, request, out)
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← what `solve_one` finds of each of the poses T ``(N, 4, 4)``.
+
+    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
+    """
+    widest()
+    solved_many(_pairs, _angles, store, solve, _ROWS, params, T, (seeds, lower, upper), out)
 
 
 class Slide6(Wrist6):
@@ -142,10 +161,11 @@ class Slide6(Wrist6):
         "axes 4, 5 and 6 meet in one point, and joint 3 slides perpendicular to axis 2, "
         "which is perpendicular to axis 1"
     )
+    _solve = staticmethod(solve_one)
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         super().__init__(geometry, robot)
-        self.kernels = replace(self.kernels, one=branches_one, many=branches_many)
+        self.kernels = replace(self.kernels, one=branches_one, many=branches_many, seeded=solve_many)
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The rows are the signs of X, of S and of s5; the boom is out where the middle of its range is."""
@@ -167,10 +187,6 @@ class Slide6(Wrist6):
         """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
         g = self.geometry
         return float(g.a1 + t[2] * math.cos(t[1]) + g.f * math.sin(t[1]))
-
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """None: the quick choice among branches is one of angles."""
-        return False
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: sides of axis 1 and of axis 2 that W is on, and the sign of θ5."""

@@ -36,7 +36,7 @@ from kin.robot import Robot
 from kin.solvers import closed_form_of, family_of, general6, general7
 from kin.solvers.contract import POSE, ClosedForm, SolverInput
 from kin.solvers.rounded import Rounded7
-from kin.solvers.wrist5.branches import solve
+from kin.solvers.wrist5.batch import solve_one
 from kin.transforms import Array
 from kin.workspace import (
     MEASURES,
@@ -112,7 +112,7 @@ def compiled() -> bool:
 
     Others are there too where only `kin.fk` has been called.
     """
-    return is_cached(solve)
+    return is_cached(solve_one)
 
 
 def rest_compiled() -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
-from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, each, one, rows_of
+from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, many, one, rows_of
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.collinear7.branches import SLACK, solve
 from kin.tolerances import TOLERANCES
@@ -24,7 +24,6 @@ from kin.transforms import Array
 _PAIRS, _END = 12, OWN + 12
 _FIRST, _SECOND, _ROWS = _END + _PAIRS, _END + _PAIRS + 2, _END + _PAIRS + 5
 _SINGULAR = TOLERANCES.singular
-_UNBOUND = 1e6  # rad; joint limits that never bind
 
 
 @inlined
@@ -132,16 +131,17 @@ def _store(arm: Array, S: Array, b: int, out: Array) -> None:
 
 
 @jit
-def _robust(arm: Array, T: Array, value: float, near: Array, out: Array) -> None:
+def _robust(
+    arm: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
     """out ``(8, 7)`` ← all branches, by the kernel that also handles singular poses."""
-    arcs, rows, lower, upper = np.empty((1, 3)), np.empty((8, 9)), np.empty(7), np.empty(7)
-    for i in range(7):
-        lower[i], upper[i] = -_UNBOUND, _UNBOUND
-    no = arcs.shape[0] == 0  # a literal False would compile `solve` a second time
-    solve(arm, T, (value, math.nan, 0.0, no, no), near, lower, upper, arcs, arcs, rows)
+    found, rows = np.empty((1, 3)), np.empty((8, 9))
+    no = found.shape[0] == 0  # a literal False would compile `solve` a second time
+    gap, count, _ = solve(arm, T, (value, math.nan, 0.0, no, no), near, lower, upper, found, found, rows)
     for i in range(8):
         for j in range(7):
             out[i, j] = rows[i, j]
+    return gap, count
 
 
 @jit
@@ -151,7 +151,7 @@ def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) 
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    each(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (values, near), out)
+    many(_pairs, _angles, _store, _robust, _ROWS, arm, T, (values, near), out)
 
 
 @jit

@@ -14,7 +14,7 @@ from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import Entries, is_wanted, solve_each
+from kin.solvers.blocks import Entries
 from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row
 from kin.solvers.parallel6.geometry import A1, A2, A3, A4, BESIDE, COS_TWIST, D5, OFFSET, SIGN, SIN_TWIST
@@ -36,7 +36,7 @@ _ORDER = (1, 2, 3, 5, 0, 4)  # joints of the columns of a box
 def solve(
     params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
 ) -> tuple[float, int]:
-    """out ``(8, 6)`` ← the branches of T ``(4, 4)``: (gap in metres, number of arcs of θ6).
+    """out ``(8, 6)`` ← the branches of T ``(4, 4)``: (gap in metres, number of arcs of θ6 or −1 if it is fixed).
 
     near, lower, upper ``(6,)``: seed and joint limits, which decide what a singular target leaves free; value: θ6
     where that is free, NaN to let the seed decide. A seventh column, if out has one, ← 1.0 where θ6 is free.
@@ -47,31 +47,21 @@ def solve(
     for i in range(6):
         for row in range(3):
             box[row, i] = joint_box[row, _ORDER[i]]
-    return branches(params, T, (value, -1), box, arcs, out)
-
-
-@jit
-def branches(
-    params: Array, T: Array, wanted: tuple[float, int], box: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `solve`, with the box instead of seed and limits; wanted: value, and the only branch to compute or −1."""
     M = canonical(params, T)
     wx, wy, wz = M[3], M[7], M[11]
     y = (params[COS_TWIST] * wz - params[BESIDE]) / params[SIN_TWIST]
     r = math.sqrt(wx * wx + wy * wy)
     if r < abs(y) - _REACH:
-        return abs(y) - r, 0
+        return abs(y) - r, -1
     root = math.sqrt(max((r - abs(y)) * (r + abs(y)), 0.0))
     if root < _MERGE * abs(y) or r < _SINGULAR:
         root = 0.0
     left = 1.0 if params[BESIDE] >= 0.0 else -1.0
-    gap = math.inf
-    found = 0
+    gap, found = math.inf, -1
     for right in range(1 if root == 0.0 else 2):
-        if is_wanted(wanted[1], 4 * right, 4):
-            side = left if right == 0 else -left
-            miss, found = _shoulder(params, M, side * root, right, wanted, box, arcs, found, out)
-            gap = min(gap, miss)
+        side = left if right == 0 else -left
+        miss, found = _shoulder(params, M, side * root, right, value, box, arcs, found, out)
+        gap = min(gap, miss)
     if root == 0.0:
         for branch in range(4):
             copy_row(out, branch, branch + 4)
@@ -80,11 +70,10 @@ def branches(
 
 @jit
 def _shoulder(
-    params: Array, M: Entries, x: float, right: int, wanted: tuple[float, int], box: Array, arcs: Array,
-    found: int, out: Array,
+    params: Array, M: Entries, x: float, right: int, value: float, box: Array, arcs: Array, found: int,
+    out: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """out ← the four branches with W at x in the frame that turns with axis 1: (miss, number of arcs)."""
-    value, only = wanted
     r00, r01, r02, wx, r10, r11, r12, wy, r20, r21, r22, wz = M
     ca, sa = params[COS_TWIST], params[SIN_TWIST]
     y = (ca * wz - params[BESIDE]) / sa
@@ -97,6 +86,7 @@ def _shoulder(
     wrist = (t1, x - params[A1], ca * y + sa * wz)
     if math.sqrt(m02 * m02 + m12 * m12) < _SINGULAR:
         B = 0.0 if m22 > 0.0 else math.pi
+        found = max(found, 0)
         turn = atan2(m10, m00) if m22 > 0.0 else atan2(-m10, -m00)
         for down in range(2):
             branch = 4 * right + 2 * down
@@ -118,10 +108,9 @@ def _shoulder(
     cA, sA = m02 / sine, m12 / sine
     aimed = atan2(m12, m02), atan2(sine, m22), atan2(cA * m10 - sA * m00, cA * m11 - sA * m01)
     for flip in range(2):
-        if is_wanted(only, flip, 1):
-            m = (m00, m01, m02, m10, m11, m12, m22)
-            miss = _arm(params, wrist, m, aimed, (4 * right + flip, only), slack, box, out)
-            gap = min(gap, miss)
+        m = (m00, m01, m02, m10, m11, m12, m22)
+        miss = _arm(params, wrist, m, aimed, 4 * right + flip, slack, box, out)
+        gap = min(gap, miss)
     return gap, found
 
 
@@ -131,18 +120,17 @@ def _arm(
     wrist: tuple[float, float, float],
     m: tuple[float, float, float, float, float, float, float],
     aimed: tuple[float, float, float],
-    rows: tuple[int, int],
+    branch: int,
     slack: float,
     box: Array,
     out: Array,
 ) -> float:
     """out[branch], out[branch + 2] ← elbow up and down of one shoulder and wrist; by how much they miss, metres.
 
-    rows: branch, and the only one to compute or −1. wrist: θ1, and W in the plane of axes 2, 3, 4; m: entries of
-    the rotation after axis 1, without the third row's first two; aimed: its angles A, B, C with sin B > 0.
+    wrist: θ1, and W in the plane of axes 2, 3, 4; m: entries of the rotation after axis 1, without the third row's
+    first two; aimed: its angles A, B, C with sin B > 0.
     """
     t1, u, v = wrist
-    branch, only = rows
     m00, m01, m02, m10, m11, m12, m22 = m
     a2, a3, a4, d5 = params[A2], params[A3], params[A4], params[D5]
     sine = math.sqrt(m02 * m02 + m12 * m12)
@@ -163,8 +151,6 @@ def _arm(
         return miss
     middle, half = atan2(py, px), atan2(k2, k1)
     for down in range(2 if bend > 0.0 else 1):
-        if not is_wanted(only, 2 * down, 2):
-            continue
         up = _elbow_sign(params, branch + 2 * down)
         t2, t3 = middle - up * half, up * bend
         if px * px + py * py < _SINGULAR * _SINGULAR:
@@ -278,12 +264,3 @@ def _folded(total: float, box: Array) -> float:
     angles = np.empty(4)
     planar_angles((0.0, 0.0, 0.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0), total + math.pi, box, angles)
     return float(angles[0])
-
-
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
-
-    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
-    """
-    solve_each(solve, math.nan, (128, 7), params, T, seeds, (lower, upper), out)

@@ -21,8 +21,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, left_or_right, names_of, stance_of
-from kin.solvers.parallel6.batch import branches_many, branches_one, nearest_many
-from kin.solvers.parallel6.branches import solve, solve_many
+from kin.solvers.parallel6.batch import branches_many, branches_one, solve_many, solve_one
 from kin.solvers.parallel6.geometry import BASE, COS_TWIST, TOOL, Geometry, geometry_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
@@ -86,13 +85,13 @@ class Parallel6(ClosedForm):
         out, arcs = np.empty((8, 7)), np.empty((128, 3))
         T, lower, upper = without_last(problem) if free_roll else (problem.T, problem.lower, problem.upper)
         value = math.nan if free_roll else problem.values[0]
-        gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
+        gap, count = solve_one(g.params, T, value, problem.seed, lower, upper, arcs, out)
         q = out[:, :6]
         if free_roll:
             ranges = free_last(problem, q)
             values = q[:, 5:].copy()
         else:
-            ranges = arcs[:count]
+            ranges = arcs[: max(count, 0)]
             values = np.empty((8, 1))
             values.fill(math.nan)
             if 1.0 in out[:, 6].tolist():
@@ -107,11 +106,6 @@ class Parallel6(ClosedForm):
         return float(
             g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
         )
-
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """Of many poses the branch nearest to the seed."""
-        nearest_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the arm's side of axis 1, and the signs of x s3 and of s5."""

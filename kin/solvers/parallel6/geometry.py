@@ -10,7 +10,6 @@ import numpy as np
 from kin.axes import is_along, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
 from kin.solvers.canonical import pose_params
-from kin.solvers.common import UNBOUNDED
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -18,15 +17,13 @@ from kin.transforms import Array
 BASE, TOOL, SIGN, OFFSET = 0, 12, 24, 30
 # Lengths in metres, cosine and sine of the twist from axis 1 to axis 2.
 A1, A2, A3, A4, D5, BESIDE, COS_TWIST, SIN_TWIST = range(36, 44)
-# Joint limits that never bind, for the kernels without limits.
-LOW, HIGH, SIZE = 44, 50, 56
 
 
 class Geometry(NamedTuple):
     """The arm in canonical form: angles are θ = sign q + offset.
 
     Attributes:
-        params: the array ``(56,)`` that the kernels read.
+        params: the array ``(44,)`` that the kernels read.
         sign, offset: ``(6,)``.
         a1, a2, a3, a4, d5: distances from axis 1 to 2, 2 to 3, 3 to 4, 4 to 5, and along axis 5 to W.
         beside: L, the sum of the offsets along axes 2, 3 and 4.
@@ -59,6 +56,6 @@ def geometry_of(robot: Robot) -> Geometry | None:
     beside = 0.0 if is_zero(d[3]) else float(d[3])
     shape = [a1, a2, a3, a4, d5, beside, math.cos(alpha[0]), math.sin(alpha[0])]
     pose = pose_params(links.base, links.tool)
-    params = np.array([*pose, *links.sign, *links.theta, *shape, *[-UNBOUNDED] * 6, *[UNBOUNDED] * 6])
+    params = np.array([*pose, *links.sign, *links.theta, *shape])
     on_axis = is_zero(links.tool[0, 3], links.tool[1, 3]) and is_along(links.tool)
     return Geometry(params, links.sign, links.theta, a1, a2, a3, a4, d5, beside, on_axis)

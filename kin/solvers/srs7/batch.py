@@ -13,7 +13,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import WIDE, sin_cos, widest
-from kin.solvers.blocks import OWN, VALUE, Arc, Entries, double, each, in_base, one, rows_of
+from kin.solvers.blocks import OWN, VALUE, Arc, Entries, double, in_base, many, one, rows_of
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.common import shifted
 from kin.solvers.srs7.branches import solve
@@ -24,7 +24,6 @@ from kin.transforms import Array
 # Rows of a block: OWN + i is y of θ(i + 1), _END + i is x of it, for i < _PAIRS.
 _PAIRS, _END, _ROWS = 7, OWN + 7, OWN + 15
 _SINGULAR = TOLERANCES.singular
-_UNBOUND = 1e6  # rad; joint limits that never bind
 Vector = tuple[float, float, float]
 
 
@@ -163,16 +162,17 @@ def _seed_direction(arm: Array, near: Array, count: int, S: Array) -> Vector:
 
 
 @jit
-def _robust(arm: Array, T: Array, value: float, near: Array, out: Array) -> None:
+def _robust(
+    arm: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
     """out ``(8, 7)`` ← all branches, by the kernel that also handles singular poses."""
-    arcs, rows, lower, upper = np.empty((1, 3)), np.empty((8, 8)), np.empty(7), np.empty(7)
-    for i in range(7):
-        lower[i], upper[i] = -_UNBOUND, _UNBOUND
-    no = arcs.shape[0] == 0  # a literal False would compile `solve` a second time
-    solve(arm, T, (value, no, no, no), near, lower, upper, arcs, rows)
+    found, rows = np.empty((1, 3)), np.empty((8, 8))
+    no = found.shape[0] == 0  # a literal False would compile `solve` a second time
+    _, gap, count = solve(arm, T, (value, no, no, no), near, lower, upper, found, rows)
     for i in range(8):
         for j in range(7):
             out[i, j] = rows[i, j]
+    return gap, count
 
 
 @joined
@@ -205,7 +205,7 @@ def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) 
     values: the arm angle of each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    each(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (values, near), out)
+    many(_pairs, _angles, _store, _robust, _ROWS, arm, T, (values, near), out)
 
 
 @jit

@@ -1,4 +1,4 @@
-"""Vectorised kernels: all branches for a tool point and an approach direction, without limits or intervals.
+"""The kernels in lanes: all branches for a tool point and an approach direction, where they are not singular.
 
 The scheme is that of :mod:`kin.solvers.blocks`; no sine or cosine of an angle is computed. Of each target the four
 combinations of shoulder and elbow are computed; the other wrist is −θ5 and half a turn on in θ4.
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
 from kin.solvers.blocks import (
@@ -17,15 +15,16 @@ from kin.solvers.blocks import (
     OWN,
     Arc,
     double,
-    each,
     elbow_of,
     in_base,
-    nearest_each,
+    many,
     one,
     rows_of,
     single,
+    solved,
+    solved_many,
 )
-from kin.solvers.wrist5.branches import branches, solve
+from kin.solvers.wrist5.branches import solve
 from kin.solvers.wrist5.geometry import A1, A2, BASE, D4, D6, OFFSET
 from kin.transforms import Array
 
@@ -33,7 +32,6 @@ from kin.transforms import Array
 # The other shoulder is half a turn on in θ1, the other elbow is −θ3.
 _FRONT, _BEND, _UPPER, _ROLL, _TILT, _END = (OWN + i for i in (0, 1, 3, 7, 11, 15))
 _PAIRS, _ROWS = _END - OWN, _END + _END - OWN + 1
-_UNBOUND = 1e6  # rad; joint limits that never bind
 Pair = tuple[float, float]
 Vector = tuple[float, float, float]
 
@@ -121,15 +119,13 @@ def _store(arm: Array, S: Array, b: int, out: Array) -> None:
 
 
 @jit
-def _robust(arm: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(8, 5)`` ← all branches, by the kernel that also handles singular poses."""
-    arcs, rows, lower, upper = np.empty((8, 3)), np.empty((8, 6)), np.empty(5), np.empty(5)
-    for i in range(5):
-        lower[i], upper[i] = -_UNBOUND, _UNBOUND
-    solve(arm, T, value, near, lower, upper, arcs, rows)
-    for i in range(8):
-        for j in range(5):
-            out[i, j] = rows[i, j]
+def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(8, 5)`` ← all branches of the target T ``(4, 4)``, NaN where there is none; False if T is not finite.
+
+    value: θ1 where the wrist centre is on axis 1, NaN for that of near ``(5,)``. `near` also decides θ4 where
+    sin θ5 vanishes.
+    """
+    return one(_pairs, _angles, _store, solve, (_ROWS, _PAIRS), arm, T, (value, near), out)
 
 
 @jit
@@ -139,21 +135,23 @@ def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) 
     values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
     """
     widest()
-    each(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (values, near), out)
+    many(_pairs, _angles, _store, solve, _ROWS, arm, T, (values, near), out)
 
 
 @jit
-def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(8, 5)`` ← all branches of the target T ``(4, 4)``, NaN where there is none; False if T is not finite.
+def solve_one(
+    arm: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `solve`, which is called where T ``(4, 4)`` is singular; elsewhere the number of intervals is −1."""
+    request = (value, near, lower, upper, arcs)
+    return solved(_pairs, _angles, _store, solve, (_ROWS, _PAIRS), arm, T, request, out)
 
-    value: θ1 where the wrist centre is on axis 1, NaN for that of near ``(5,)``. `near` also decides θ4 where
-    sin θ5 vanishes.
+
+@jit
+def solve_many(arm: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 5)`` ← what `solve_one` finds of each of the targets T ``(N, 4, 4)``.
+
+    seeds ``(N, 5)``, or ``(1, 5)`` for all; lower, upper ``(5,)``: joint limits.
     """
-    return one(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (value, near), out)
-
-
-@jit
-def nearest_many(arm: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 5)`` ← of each of the poses T the branch nearest to its seed, see `nearest_each`."""
     widest()
-    nearest_each(_pairs, _angles, _store, branches, (_ROWS, 6), arm, T, (seeds, lower, upper), out)
+    solved_many(_pairs, _angles, _store, solve, _ROWS, arm, T, (seeds, lower, upper), out)

@@ -10,12 +10,13 @@ from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import is_wanted, solve_each
 from kin.solvers.canonical import canonical_box
 from kin.solvers.common import clear, copy_row, merged
 from kin.solvers.wrist5.geometry import A1, A2, D4, D6, OFFSET, REACH, SINGULAR, wrist_angles
 from kin.solvers.wrist5.redundancy import choose_theta1
 from kin.transforms import Array
+
+_GIVEN = 5  # column of out: θ1 where it is a redundancy parameter
 
 
 @jit
@@ -46,36 +47,21 @@ def solve(
     arm: Array, T: Array, value: float, seed: Array, lower: Array, upper: Array, arcs: Array, out: Array
 ) -> tuple[float, int]:
     """All branches for the tool point and approach direction of T ``(4, 4)``: (gap in metres, number of
-    intervals).
+    intervals of θ1 or −1 if it is fixed).
 
-    out ``(8, 6)`` ← five joint values of each branch and θ1 where it is a redundancy parameter, else NaN; two that
-    have merged are both there. arcs ``(n, 3)`` ← its feasible intervals, rows (branch, low, high), canonical.
+    out ``(8, 5)`` ← five joint values of each branch; two that have merged are both there. A sixth column, if out
+    has one, ← θ1 where it is a redundancy parameter, else NaN. arcs ``(n, 3)`` ← its feasible intervals, rows
+    (branch, low, high), canonical; none are computed if `arcs` has no rows, and θ1 is then the seed's.
     value: the requested θ1, NaN for a feasible one near the seed. seed, lower, upper ``(5,)``: joint values.
     """
     clear(out)
-    box = np.empty((4, 5))
+    a, box = np.empty(3), np.empty((3, 5))
     canonical_box(arm[OFFSET:A1], seed, lower, upper, box)
-    return branches(arm, T, (value, -1), box, arcs, out)
-
-
-@jit
-def branches(
-    arm: Array, T: Array, wanted: tuple[float, int], box: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `solve`, with the box of canonical seed and limits; wanted: value, and the only branch to compute or −1.
-
-    A fourth row of box ``(4, 5)`` is scratch.
-    """
-    value, only = wanted
-    a = box[3]
     wx, wy, h = _wrist_centre(arm, T, a)
     r = math.sqrt(wx * wx + wy * wy)
     on_axis = r < SINGULAR
-    gap = math.inf
-    found = 0
+    gap, found = math.inf, 0 if on_axis else -1
     for side in range(1 if on_axis else 2):
-        if not is_wanted(only, 4 * side, 4):
-            continue
         shoulder = 1.0 if side == 0 else -1.0
         rho = shoulder * r - arm[A1]
         bend, miss = _elbow(arm, rho, h)
@@ -87,15 +73,14 @@ def branches(
         spread = atan2(arm[D4] * sine, arm[A2] + arm[D4] * cosine)
         for i in range(4 if bend > 0.0 else 2):
             branch = 4 * side + i
-            if not is_wanted(only, branch, 3):
-                continue
             row = out[branch]
             t1 = azimuth
             t2, t3 = (climb - spread, bend) if i < 2 else (climb + spread, -bend)
             if on_axis:
                 given = value if math.isnan(value) else value + arm[OFFSET]
                 t1, found = choose_theta1(t2 + t3, a, branch, given, box, arcs, found)
-                row[5] = wrap(t1 - arm[OFFSET])
+                if out.shape[1] > _GIVEN:
+                    row[_GIVEN] = wrap(t1 - arm[OFFSET])
             row[0], row[1], row[2] = t1, t2, t3
             wrist_angles(t1, t2 + t3, a, branch, box, row)
             for joint in range(5):
@@ -107,12 +92,3 @@ def branches(
         for branch in range(4):
             copy_row(out, branch, branch + 4)
     return gap, found
-
-
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 5)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
-
-    seeds ``(N, 5)``, or ``(1, 5)`` for all; lower, upper ``(5,)``: joint limits.
-    """
-    solve_each(solve, math.nan, (128, 6), params, T, seeds, (lower, upper), out)

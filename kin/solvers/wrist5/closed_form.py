@@ -22,8 +22,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of, up_or_down
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist5 import point
-from kin.solvers.wrist5.batch import branches_many, branches_one, nearest_many
-from kin.solvers.wrist5.branches import solve, solve_many
+from kin.solvers.wrist5.batch import branches_many, branches_one, solve_many, solve_one
 from kin.solvers.wrist5.geometry import OFFSET, REACH, Geometry
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -105,19 +104,14 @@ class Wrist5(ClosedForm):
         if problem.task == POSITION:
             return point.solve(self.geometry, problem)
         out, arcs, arm = np.empty((8, 6)), np.empty((128, 3)), self.kernels.params
-        gap, count = solve(
+        gap, count = solve_one(
             arm, problem.T, problem.values[0], problem.seed, problem.lower, problem.upper, arcs, out
         )
-        arcs = arcs[:count]
-        if count:
+        arcs = arcs[: max(count, 0)]
+        if count > 0:
             arcs[:, 1:] -= arm[OFFSET]
         obstacle = None if gap <= REACH else Obstacle("approach direction")
         return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
-
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """Of many poses the branch nearest to the seed."""
-        nearest_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of the wrist centre's x, of s3 and of s5."""

@@ -49,7 +49,7 @@ def choose_theta1(
     approach direction a ``(3,)``.
     """
     breaks, probes, angles = np.empty(32), np.empty(66), np.empty(5)
-    n = lay_probes(breaks, _theta1_breaks(t23, a, box, breaks), probes)
+    n = lay_probes(breaks, _theta1_breaks(t23, a, box, breaks), probes) if arcs.shape[0] > 0 else 0
     first = found
     best = math.inf
     t1 = box[NEAR, 0]

@@ -1,4 +1,4 @@
-"""The batch kernels: all branches without limits, ranges or a choice, see :mod:`kin.solvers.blocks`.
+"""The kernels in lanes: all branches of targets that are not singular, see :mod:`kin.solvers.blocks`.
 
 Rows of S are θ1 (front, back), θ3 (front, back), and of the four arms (front up, front down, back up, back down)
 θ2, θ4, θ5, θ6. The other elbow is −θ3, the other wrist −θ5 and half a turn on in θ4 and θ6.
@@ -19,14 +19,15 @@ from kin.solvers.blocks import (
     Entries,
     canonical_of,
     double,
-    each,
     elbow_of,
-    nearest_each,
+    many,
     one,
     rows_of,
     single,
+    solved,
+    solved_many,
 )
-from kin.solvers.wrist6.branches import Rotation, branches, solve
+from kin.solvers.wrist6.branches import Rotation, solve
 from kin.solvers.wrist6.geometry import (
     A1,
     A2,
@@ -34,13 +35,10 @@ from kin.solvers.wrist6.geometry import (
     BESIDE,
     COS_PHASE,
     COS_TWIST,
-    HIGH,
-    LOW,
     OFFSET,
     SIGN,
     SIN_PHASE,
     SIN_TWIST,
-    SIZE,
     TOOL,
     F,
 )
@@ -190,26 +188,32 @@ def store(params: Array, S: Array, b: int, out: Array) -> None:
 
 
 @jit
-def careful(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
-    """out ``(8, 6)`` ← the branches by `solve`, which also handles singular targets."""
-    solve(params, T, value, near, params[LOW:HIGH], params[HIGH:SIZE], out[:0], out)
-
-
-@jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    return one(_pairs, _angles, store, careful, (ROWS, PAIRS), params, T, (value, near), out)
+    return one(_pairs, _angles, store, solve, (ROWS, PAIRS), params, T, (value, near), out)
 
 
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
-    each(_pairs, _angles, store, careful, (ROWS, PAIRS), params, T, (values, near), out)
+    many(_pairs, _angles, store, solve, ROWS, params, T, (values, near), out)
 
 
 @jit
-def nearest_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 6)`` ← of each of the poses T the branch nearest to its seed, see `nearest_each`."""
+def solve_one(
+    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `solve`, which is called where T ``(4, 4)`` is singular."""
+    request = (value, near, lower, upper, arcs)
+    return solved(_pairs, _angles, store, solve, (ROWS, PAIRS), params, T, request, out)
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← what `solve_one` finds of each of the poses T ``(N, 4, 4)``.
+
+    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
+    """
     widest()
-    nearest_each(_pairs, _angles, store, branches, (ROWS, 6), params, T, (seeds, lower, upper), out)
+    solved_many(_pairs, _angles, store, solve, ROWS, params, T, (seeds, lower, upper), out)

@@ -9,7 +9,7 @@ import numpy as np
 from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import Entries, is_wanted, solve_each
+from kin.solvers.blocks import Entries
 from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import (
     HIGH,
@@ -64,14 +64,6 @@ def solve(
     clear(out)
     box = np.empty((3, 6))
     signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET : OFFSET + 6], box)
-    return branches(params, T, (value, -1), box, arcs, out)
-
-
-@jit
-def branches(
-    params: Array, T: Array, wanted: tuple[float, int], box: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `solve`, with the box of signed seed and limits; wanted: value, and the only branch to compute or −1."""
     M = canonical(params, T)
     wx, wy = M[3], M[7]
     beside = params[BESIDE]
@@ -86,10 +78,9 @@ def branches(
     gap = math.inf
     found = 0 if free else -1
     for back in range(1 if single else 2):
-        if is_wanted(wanted[1], 4 * back, 4):
-            X = root if back == 0 else -root
-            miss, found = _shoulder(params, M, X, back, wanted, box, arcs, found, out)
-            gap = min(gap, miss)
+        X = root if back == 0 else -root
+        miss, found = _shoulder(params, M, X, back, value, box, arcs, found, out)
+        gap = min(gap, miss)
     if single:
         for branch in range(4):
             copy_row(out, branch, branch + 4)
@@ -98,14 +89,13 @@ def branches(
 
 @jit
 def _shoulder(
-    params: Array, M: Entries, X: float, back: int, wanted: tuple[float, int], box: Array, arcs: Array,
-    found: int, out: Array,
+    params: Array, M: Entries, X: float, back: int, value: float, box: Array, arcs: Array, found: int,
+    out: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """out ← the four branches with W at (X, L) in the frame that turns with axis 1: (miss, number of arcs).
 
     θ1 is free if `found` is not negative.
     """
-    value, only = wanted
     h, beside, slides = -M[11], params[BESIDE], params[SLIDES] != 0.0
     miss, bend, c3, k1, k2, x = _elbow(params, X - params[A1], h, abs(X))
     if miss > _REACH:
@@ -116,8 +106,6 @@ def _shoulder(
     t1 = atan2(M[7], M[3]) - atan2(beside, X)
     R = _turned(M, X, beside)
     for down in range(2 if bend > 0.0 else 1):
-        if not is_wanted(only, 2 * down, 2):
-            continue
         up = 1.0 if down == (0 if slides else back) else -1.0
         e1, e2 = (up * k1, k2) if slides else (k1, up * k2)
         c2, s2 = x * e1 + h * e2, h * e1 - x * e2
@@ -291,12 +279,3 @@ def _affine_wrist(params: Array, M: Entries, t23: tuple[float, float], parts: Ar
         parts[0, 0, j], parts[0, 1, j], parts[0, 2, j] = _seen(params, g, s, 0.0, 0.0, z)
         parts[1, 0, j], parts[1, 1, j], parts[1, 2, j] = _seen(params, g, s, x, y, 0.0)
         parts[2, 0, j], parts[2, 1, j], parts[2, 2, j] = _seen(params, g, s, y, -x, 0.0)
-
-
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
-
-    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
-    """
-    solve_each(solve, math.nan, (128, 6), params, T, seeds, (lower, upper), out)

@@ -33,8 +33,7 @@ from kin.solvers.names import (
     up_or_down,
 )
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
-from kin.solvers.wrist6.batch import branches_many, branches_one, nearest_many
-from kin.solvers.wrist6.branches import solve, solve_many
+from kin.solvers.wrist6.batch import branches_many, branches_one, solve_many, solve_one
 from kin.solvers.wrist6.geometry import BASE, TOOL, Geometry, geometry_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -57,6 +56,7 @@ class Wrist6(ClosedForm):
 
     name, title, quick = NAME, TITLE, (POSE,)
     reason = "axes 4, 5 and 6 meet in one point, and axes 2 and 3 are parallel and perpendicular to axis 1"
+    _solve = staticmethod(solve_one)
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
@@ -105,7 +105,7 @@ class Wrist6(ClosedForm):
         T, lower, upper = without_last(problem) if free_roll else (problem.T, problem.lower, problem.upper)
         reaches_axis_1 = self._reaches_axis_1
         value = problem.values[0] if reaches_axis_1 else math.nan
-        gap, count = solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
+        gap, count = self._solve(g.params, T, value, problem.seed, lower, upper, arcs, out)
         values, ranges = np.empty((8, reaches_axis_1 + free_roll)), []
         values.fill(math.nan)
         if reaches_axis_1:
@@ -129,11 +129,6 @@ class Wrist6(ClosedForm):
         """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
         g = self.geometry
         return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
-
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """Of many poses the branch nearest to the seed."""
-        nearest_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of X, of X s3 and of s5."""

@@ -10,7 +10,6 @@ import numpy as np
 from kin.axes import Links, is_along, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
 from kin.solvers.canonical import pose_params
-from kin.solvers.common import UNBOUNDED
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -19,15 +18,13 @@ BASE, TOOL, SIGN, OFFSET = 0, 12, 24, 30
 # Lengths in metres; how axis 4 is turned against the line from axis 3 to W: cosine and sine of a rotation about
 # axis 3 and of the twist; 1.0 if joint 3 slides.
 A1, A2, F, BESIDE, COS_PHASE, SIN_PHASE, COS_TWIST, SIN_TWIST, SLIDES = range(36, 45)
-# Joint limits that never bind, for the kernels without limits.
-LOW, HIGH, SIZE = 45, 51, 57
 
 
 class Geometry(NamedTuple):
     """The arm in canonical form: angles are θ = sign q + offset.
 
     Attributes:
-        params: the array ``(57,)`` that the kernels read.
+        params: the array ``(45,)`` that the kernels read.
         sign, offset: ``(6,)``.
         a1, a2, f, beside: distances from axis 1 to 2, 2 to 3, 3 to W, and of the arm's plane from axis 1 (L).
         tool_on_axis: whether joint 6 turns the tool about its own z axis.
@@ -84,6 +81,6 @@ def pack(
     """
     shape = [*lengths, math.cos(phase), math.sin(phase), math.cos(twist), math.sin(twist), float(slides)]
     pose = pose_params(links.base, links.tool)
-    params = np.array([*pose, *links.sign, *offset, *shape, *[-UNBOUNDED] * 6, *[UNBOUNDED] * 6])
+    params = np.array([*pose, *links.sign, *offset, *shape])
     on_axis = is_zero(links.tool[0, 3], links.tool[1, 3]) and is_along(links.tool)
     return Geometry(params, links.sign, offset, *lengths, on_axis)

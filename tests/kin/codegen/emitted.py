@@ -14,12 +14,11 @@ import numpy as np
 import kin
 from kin.codegen import families, files, wrappers
 from kin.codegen.arm import Arm, arm_of
-from kin.codegen.types import Constants
 from kin.differential.metric import weights
 from kin.ik.candidates import Requirement, Rows, measure_and_sort
 from kin.kernels.checks import straighten
 from kin.robot import Robot
-from kin.solvers.contract import POSE, SolverInput
+from kin.solvers.contract import POSE
 from kin.solvers.scaled import in_unit
 from kin.warmup import MADE_UP, made_up_arms
 
@@ -159,14 +158,9 @@ def answer(arm: Arm, T, seed, value):
     rows = alone.inner.rows if alone.rows is wrappers.of_counted else alone.rows
     if rows in (families.without_limits, families.of_elimination):
         form.kernels.one(form.kernels.params, pose, value, seed, q)
-    elif isinstance(alone.inner, Constants) and rows is alone.rows:  # Python computes sums of products otherwise
+    else:  # the careful kernel, of regular targets too
         limits, arcs = (robot.lower, robot.upper), np.empty((256, 3))
         alone.rows(alone.inner, alone.params, pose, value, seed, limits, arcs, q)
-    else:
-        values = (value,) * len(form.redundancies(POSE))
-        q = np.array(
-            form.solve(SolverInput(pose, POSE, values, True, seed, robot.lower, robot.upper)).q, order="C"
-        )
     k = len(q)
     rows = Rows(q, np.empty((k, 5)), np.empty(k, bool), np.empty(k, bool), np.empty(k, np.int64))
     turns = arm.constants["turns" if math.isnan(value) else "held"]

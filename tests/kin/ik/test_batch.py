@@ -15,9 +15,9 @@ from numba import njit
 
 import kin
 from kin import InputError
+from kin.codegen.families import alone
 from kin.ik import batch, problem
 from kin.ik.answers import answer
-from kin.ik.candidates import nearest_rows
 from kin.kernels import simd
 from kin.robot import Joint, Robot
 from kin.solvers import closed_form_of
@@ -546,30 +546,26 @@ def test_regular_targets_of_few_joints_take_no_results(name, monkeypatch):
     assert kin.solve_ik_many(robot, kin.fk(robot, q), q_seed=seeds).solved.all()
 
 
-QUICK = [
-    *map(kin.get_robot, ("pioneer5", "puma560", "ur5", "irb120")),
+IN_LANES = [
+    *map(kin.get_robot, ("pioneer5", "puma560", "ur5", "irb120", "stanford")),
     reversed_at(kin.get_robot("pioneer5"), (1, 3)),
     reversed_at(kin.get_robot("ur5"), (0, 2, 4)),
 ]
 
 
-@pytest.mark.parametrize("robot", QUICK, ids=lambda robot: robot.id)
-@pytest.mark.parametrize("near", ["", "singular", "limits", "reach", "grid"])
-def test_the_branch_chosen_from_vectorised_rows_is_that_of_all_rows(robot, near):
-    """At targets beside singularities, limits, the end of the reach and half turns."""
-    rng, count = np.random.default_rng(11), 1500
-    form, prepared = closed_form_of(robot), problem.prepare(robot, kin.IKOptions())
+def hard_targets(robot, near, count):
+    """Targets, and seeds ``(count, n)``, beside singularities, limits, the end of the reach and half turns."""
+    rng, form = np.random.default_rng(11), closed_form_of(robot)
     q, seeds = robot.random_q(rng, count), robot.random_q(rng, count)
     seeds[::2] = q[::2] + 0.05 * rng.normal(size=q[::2].shape)
     tiny = 10.0 ** rng.uniform(-13.0, -2.0, q.shape) * rng.choice([-1.0, 1.0], q.shape)
     if near in {"singular", "reach"}:
-        kinds = ("elbow",) if near == "reach" else ("elbow", "wrist")
         for row, by in zip(q, tiny, strict=True):
-            kind = rng.choice(kinds)
-            for joint, value in next(s.met_at for s in form.singularities(row) if s.kind == kind):
+            kinds = [s.met_at for s in form.singularities(row) if s.kind == "elbow" or near == "singular"]
+            for joint, value in kinds[rng.integers(len(kinds))]:
                 row[joint] = value + by[joint] * (near == "singular")
     if near == "limits":
-        end = np.where(rng.random(q.shape) < 0.5, prepared.lower, prepared.upper)
+        end = np.where(rng.random(q.shape) < 0.5, robot.lower, robot.upper)
         q = np.where(rng.random(q.shape) < 0.3, end + tiny, q)
     if near == "grid":
         q = np.round(q / (math.pi / 4)) * (math.pi / 4) + tiny
@@ -577,37 +573,31 @@ def test_the_branch_chosen_from_vectorised_rows_is_that_of_all_rows(robot, near)
     T = kin.fk(robot, q)
     if near == "reach":
         T[:, :3, 3] *= 1.0 + tiny[:, :1] * 1e-4
-    chosen, best = np.empty((2, count, robot.n))
-    form.nearest_many(T, seeds, prepared.lower, prepared.upper, chosen)
-    nearest_rows(prepared.requirement, T, seeds, chosen[:, None].copy(), chosen)
-    rows = np.empty((count, len(form.branches), robot.n))
-    form.solve_many(T, seeds, prepared.lower, prepared.upper, rows)
-    nearest_rows(prepared.requirement, T, seeds, rows, best)
-    clear = ~np.isnan(chosen[:, 0])
-    assert clear.mean() >= {"": 0.9, "singular": 0.04, "limits": 0.2}.get(near, 0.0)
-    assert np.array_equal(chosen[clear], best[clear])
+    return T, seeds
 
 
-def test_a_choice_that_is_not_clear_is_left_open():
-    """The nearest branch at a limit, two that are equally near, and a seed outside the limits."""
-    robot = kin.get_robot("puma560")
-    form, home = closed_form_of(robot), np.array([0.3, 0.4, -0.5, 0.6, 0.7, 0.8])
-
-    def chosen(q, seed, limit=3.0):
-        found, T, near = np.empty((1, 6)), kin.fk(robot, q)[None], np.array(seed)[None]
-        form.nearest_many(T, near, np.full(6, -limit), np.full(6, limit), found)
-        return found[0]
-
-    # The other wrist is half a turn away from this seed, but not the nearest branch.
-    assert np.allclose(chosen(home, home), home)
-    for joint in range(6):
-        at = home.copy()
-        at[joint] = 3.0
-        assert np.isnan(chosen(at, at - 1e-3)[0])
-        assert np.allclose(chosen(at, at - 1e-3, 3.1), at)
-    rows = kin.ik_branches(robot, kin.fk(robot, home))
-    assert np.isnan(chosen(home, (rows[6] + rows[7]) / 2)[0])
-    assert np.isnan(chosen(home, home + 4.0)[0])
+@pytest.mark.parametrize("robot", IN_LANES, ids=lambda robot: robot.id)
+@pytest.mark.parametrize("near", ["", "singular", "limits", "reach", "grid"])
+def test_targets_in_lanes_have_the_branches_of_the_careful_kernel(robot, near):
+    """In a batch all of them but those that leave a parameter free, and bit by bit those of a single target."""
+    T, seeds = hard_targets(robot, near, 200)
+    form, limits = closed_form_of(robot), (robot.lower, robot.upper)
+    careful = alone(robot, form)
+    many, expected = np.empty((2, len(T), len(form.branches), robot.n))
+    form.solve_many(T, seeds, *limits, many)
+    regular = 0
+    for i, (each, seed) in enumerate(zip(T, seeds, strict=True)):
+        values = (math.nan,) * len(form.redundancies(POSE))
+        found = form.solve(SolverInput(each, POSE, values, True, seed, *limits))
+        careful.rows(careful.inner, careful.params, each, math.nan, seed, limits, np.empty((256, 3)), expected[i])
+        assert np.array_equal(np.isnan(found.q), np.isnan(expected[i]))
+        off = np.abs(found.q - expected[i])
+        off = np.where(robot.revolute, np.minimum(off, 2.0 * math.pi - off), off)
+        assert np.nanmax(off, initial=0.0) < 1e-9
+        free = not np.isnan(found.values).all()
+        assert np.array_equal(many[i], np.full_like(found.q, math.nan) if free else found.q, equal_nan=True)
+        regular += not (free or np.array_equal(found.q, expected[i], equal_nan=True))
+    assert regular >= {"": 100, "limits": 100}.get(near, 0)
 
 
 def test_results_are_made_when_they_are_asked_for(monkeypatch):

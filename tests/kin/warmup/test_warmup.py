@@ -111,8 +111,8 @@ def test_two_processes_share_the_kernels_of_the_first_arm():
     """One ends with the solver, the other begins with it."""
     program = (
         "import sys; from kin import warmup\n"
-        "from kin.ik.candidates import measure_and_sort; from kin.solvers.wrist5.branches import solve\n"
-        "done = []; step = lambda number, act: (act(), done.append((number, len(solve.overloads) > 0)))\n"
+        "from kin.ik.candidates import measure_and_sort; from kin.solvers.wrist5.batch import solve_one\n"
+        "done = []; step = lambda number, act: (act(), done.append((number, len(solve_one.overloads) > 0)))\n"
         "moves = warmup._moves\n"
         "warmup._moves = lambda robot: [lambda i=i, act=act: step(i, act) for i, act in enumerate(moves(robot))]\n"
         "warmup.warm_up_first(backwards=sys.argv[1] == 'backwards')\n"
@@ -128,7 +128,7 @@ def test_kernels_of_all_arms_are_compiled_before_the_service_is_ready(monkeypatc
     arms = [robot.id for robot in warmup.one_of_each_family()]
     assert len(arms) >= 6
 
-    cached = {warmup.solve}
+    cached = {warmup.solve_one}
     monkeypatch.setattr(warmup, "is_cached", lambda kernel: kernel in cached)
     monkeypatch.setattr(warmup, "_move", lambda robot: asked.append(("move", robot.id)))
     monkeypatch.setattr(warmup, "_calls", lambda robot: [lambda: asked.append(("all", robot.id))])
