@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 
-from kin.kernels.compile import jit
+from kin.kernels.compile import jit, joined
+from kin.kernels.fk import all_finite_pose
 from kin.robot import Robot
+from kin.solvers.common import clear
 from kin.solvers.contract import ClosedForm, RedundancyParameter
 from kin.transforms import Array
 
@@ -30,13 +32,16 @@ def triple(a: Array, b: Array, c: Array) -> float:
     )
 
 
-@jit
-def is_finite(T: Array) -> bool:
-    """Whether a target ``(4, 4)`` has no NaN and no infinity."""
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                return False
+@joined
+def if_finite(
+    configurations: Callable[[Array, Array, Array, Array], object], params: Array, T: Array, near: Array,
+    out: Array,
+) -> bool:  # fmt: skip
+    """out ``(k, n)`` ← the configurations of a target T ``(4, 4)``; False, and NaN, if T is not finite."""
+    if not all_finite_pose(T):
+        clear(out)
+        return False
+    configurations(params, T, near, out)
     return True
 
 

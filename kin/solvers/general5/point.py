@@ -26,6 +26,7 @@ from kin.fk import jacobian
 from kin.kernels.compile import jit
 from kin.kernels.fk import fk_into
 from kin.robot import Robot
+from kin.solvers.blocks import in_turn
 from kin.solvers.common import UNBOUNDED, clear
 from kin.solvers.contract import (
     APPROACH,
@@ -40,7 +41,7 @@ from kin.solvers.contract import (
 )
 from kin.solvers.numeric.descent import descend
 from kin.solvers.singular import Singularity, by_jacobian, those_within
-from kin.solvers.slides import dot, is_finite, triple
+from kin.solvers.slides import dot, if_finite, triple
 from kin.solvers.wrist5.point.roots import real_roots
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -263,22 +264,14 @@ def configurations(params: Array, T: Array, near: Array, out: Array) -> None:
 
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(4, 3)`` ← the configurations of the target T ``(4, 4)``, then NaN; False if T is not finite.
-
-    `value` is not used: a point leaves nothing free.
-    """
-    if not is_finite(T):
-        clear(out)
-        return False
-    configurations(params, T, near, out)
-    return True
+    """out ``(4, 3)`` ← the configurations for the point of T ``(4, 4)``, then NaN; False if T is not finite."""
+    return if_finite(configurations, params, T, near, out)
 
 
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 4, 3)`` ← the configurations of each of the targets T ``(N, 4, 4)``."""
-    for k in range(T.shape[0]):
-        branches_one(params, T[k], values[0], near, out[k])
+    in_turn(branches_one, params, T, values, near, out)
 
 
 class Point3(ClosedForm):

@@ -8,6 +8,8 @@ import numpy as np
 
 from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
+from kin.kernels.fk import all_finite_pose
+from kin.solvers.blocks import in_turn
 from kin.solvers.common import clear
 from kin.solvers.general6.cuts import (
     AFTER,
@@ -162,10 +164,8 @@ def solve_all(params: Array, T: Array, out: Array) -> int:
     found the same as those before it. With an odd number, or none, the first cut is tried with doubtful roots.
     """
     clear(out)
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                return NOT_FINITE
+    if not all_finite_pose(T):
+        return NOT_FINITE
     count, before, known = 0, -1, OPEN
     cuts = params.shape[0] // SIZE
     for k in range(cuts):
@@ -195,8 +195,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 16, 6)`` ← all solutions of each of the targets T ``(N, 4, 4)``."""
-    for k in range(T.shape[0]):
-        branches_one(params, T[k], values[0], near, out[k])
+    in_turn(branches_one, params, T, values, near, out)
 
 
 @jit

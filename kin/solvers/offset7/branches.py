@@ -15,6 +15,8 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.kernels.compile import jit
+from kin.kernels.fk import all_finite_pose
+from kin.solvers.blocks import in_turn
 from kin.solvers.canonical import canonical_pose
 from kin.solvers.common import clear, zyz
 from kin.solvers.offset7.geometry import (
@@ -237,11 +239,9 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
     value: that of the given joint, NaN for its value in `near` ``(7,)``.
     """
-    clear(out)
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                return False
+    if not all_finite_pose(T):
+        clear(out)
+        return False
     t, close, rows, room = np.empty(7), np.empty(7), np.empty((8, 7)), np.empty(8)
     given = 6 if params[REVERSED] > 0.0 else 0
     if math.isnan(value):
@@ -258,5 +258,4 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    for k in range(T.shape[0]):
-        branches_one(params, T[k], values[min(k, values.shape[0] - 1)], near, out[k])
+    in_turn(branches_one, params, T, values, near, out)

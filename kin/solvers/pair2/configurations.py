@@ -8,7 +8,9 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.kernels.compile import jit
-from kin.solvers.blocks import solve_each
+from kin.kernels.fk import all_finite_pose
+from kin.solvers.blocks import in_turn, solve_each
+from kin.solvers.common import clear
 from kin.solvers.contract import POSE, POSITION
 from kin.solvers.pair2.geometry import (
     FIXED,
@@ -223,13 +225,9 @@ def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array
 @jit
 def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
     """out ``(rows, n)`` ← all configurations of the target T ``(4, 4)``; False if T is not finite."""
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                for row in range(out.shape[0]):
-                    for i in range(out.shape[1]):
-                        out[row, i] = math.nan
-                return False
+    if not all_finite_pose(T):
+        clear(out)
+        return False
     configurations(params, T, int(params[TASK]), near, REACH, out, np.empty((out.shape[0], 2)))
     return True
 
@@ -237,5 +235,4 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, rows, n)`` ← all configurations of each of the targets T ``(N, 4, 4)``."""
-    for k in range(T.shape[0]):
-        branches_one(params, T[k], math.nan, near, out[k])
+    in_turn(branches_one, params, T, values, near, out)

@@ -8,13 +8,12 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.kernels.compile import jit
-from kin.solvers.blocks import solve_each
+from kin.kernels.fk import all_finite_pose
+from kin.solvers.blocks import in_turn, solve_each, unbounded
 from kin.solvers.canonical import canonical_pose, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum
 from kin.solvers.contract import POSE, POSITION
 from kin.solvers.parallel5.geometry import A1, A2, A3, ALONG, BESIDE, OFFSET, ROLLS, SIGN, TOOL_Z, P, Q
-from kin.solvers.parallel5.geometry import HIGH as MOST
-from kin.solvers.parallel5.geometry import LOW as LEAST
 from kin.solvers.planar import planar_angles, planar_free
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -156,14 +155,12 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
 
     `value` is not used: a pose leaves nothing free, but for joint 1 where axis 5 is on axis 1. It then stays near.
     """
-    clear(out)
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                return False
+    if not all_finite_pose(T):
+        clear(out)
+        return False
     n = near.shape[0]
-    rows, arcs = np.empty((ROWS, n + 1)), np.empty((0, 3))
-    solve(arm, T, (POSE, math.nan), near, arm[LEAST : LEAST + n], arm[MOST : MOST + n], arcs, rows)
+    limits, rows = unbounded(n), np.empty((ROWS, n + 1))
+    solve(arm, T, (POSE, math.nan), near, limits[0], limits[1], rows[:0], rows)
     for k in range(ROWS):
         for i in range(n):
             out[k, i] = rows[k, i]
@@ -173,8 +170,7 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
 @jit
 def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 4, n)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
-    for k in range(T.shape[0]):
-        branches_one(arm, T[k], values[0], near, out[k])
+    in_turn(branches_one, arm, T, values, near, out)
 
 
 @jit

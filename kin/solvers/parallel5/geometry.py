@@ -8,7 +8,6 @@ import numpy as np
 
 from kin.axes import inverse, is_along, is_perpendicular, is_zero, links_of
 from kin.robot import Robot
-from kin.solvers.common import UNBOUNDED
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -18,15 +17,13 @@ BASE, TURNED, SIGN, OFFSET = 0, 12, 24, 29
 # Lengths in metres; C as seen from axis 4, along x and y of its link; the distance L; how far C is from the origin
 # of the last frame, along the roll axis; 1.0 if there is a roll; the tool's z axis, for arms without one.
 A1, A2, A3, P, Q, BESIDE, ALONG, ROLLS, TOOL_Z = 34, 35, 36, 37, 38, 39, 40, 41, 42
-# Joint limits that never bind, for the kernels without limits.
-LOW, HIGH, SIZE = 45, 50, 55
 
 
 class Geometry(NamedTuple):
     """The arm in canonical form: angles are θ = sign q + offset.
 
     Attributes:
-        params: the array ``(55,)`` that the kernels read.
+        params: the array ``(45,)`` that the kernels read.
         sign, offset: ``(n,)``.
         a1, a2, a3: distances from axis 1 to 2, 2 to 3, 3 to 4.
         p, q: C as seen from axis 4, along x and y of its link.
@@ -71,5 +68,5 @@ def geometry_of(robot: Robot) -> Geometry | None:
     sign[: robot.n], offset[: robot.n] = links.sign, links.theta
     lengths = [a1, a2, a3, p, q, beside, along, float(rolls), *tool[:3, 2].tolist()]
     poses = [*inverse(links.base)[:3].ravel(), *turned[:3].ravel()]
-    params = np.array([*poses, *sign, *offset, *lengths, *[-UNBOUNDED] * 5, *[UNBOUNDED] * 5])
+    params = np.array([*poses, *sign, *offset, *lengths])
     return Geometry(params, links.sign, links.theta, a1, a2, a3, p, q, beside, on_axis)

@@ -8,8 +8,10 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.kernels.compile import jit
+from kin.kernels.fk import all_finite_pose
+from kin.solvers.blocks import in_turn, unbounded
 from kin.solvers.canonical import signed_box
-from kin.solvers.common import NEAR, UNBOUNDED, clear
+from kin.solvers.common import NEAR, clear
 from kin.solvers.contract import POSE
 from kin.solvers.planar import LINKS, TOOL_X, TOOL_Y, held, planar_free
 from kin.transforms import Array
@@ -24,7 +26,7 @@ def solve(
     params: Array, T: Array, task: int, value: float, near: Array, lower: Array, upper: Array, arcs: Array,
     out: Array,
 ) -> tuple[float, int]:  # fmt: skip
-    """out ``(2, 5)`` ← both branches and φ: (gap in metres, number of arcs of φ).
+    """out ``(2, 4)`` ← both branches, and φ in a fifth column if it has one: (gap in metres, number of arcs of φ).
 
     φ is `value`, or near the seed's if that is NaN.
     """
@@ -44,7 +46,8 @@ def solve(
         if not math.isnan(phi):
             for i in range(4):
                 out[row, i] = wrap(params[SIGN + i] * (angles[i] - params[OFFSET + i]))
-            out[row, 4] = phi
+            if out.shape[1] > 4:
+                out[row, 4] = phi
     R = math.hypot(u, v)
     return max(abs(R - last) - a - b, abs(a - b) - R - last), found
 
@@ -55,21 +58,15 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
     φ is `value`, or near that of `near` if it is NaN.
     """
-    clear(out)
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                return False
-    lower, upper, rows = np.full(4, -UNBOUNDED), np.full(4, UNBOUNDED), np.empty((2, 5))
-    solve(params, T, POSE, value, near, lower, upper, np.empty((64, 3)), rows)
-    for k in range(2):
-        for i in range(4):
-            out[k, i] = rows[k, i]
+    if not all_finite_pose(T):
+        clear(out)
+        return False
+    limits = unbounded(4)
+    solve(params, T, POSE, value, near, limits[0], limits[1], np.empty((64, 3)), out)
     return True
 
 
 @jit
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 2, 4)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    for k in range(T.shape[0]):
-        branches_one(params, T[k], values[min(k, values.shape[0] - 1)], near, out[k])
+    in_turn(branches_one, params, T, values, near, out)
