@@ -54,7 +54,7 @@ FIGURES = {
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages of all arms to the site, and leave out what only the theme's authors, or other languages, need."""
+    """Add the pages of all arms, and leave out the theme's source maps and the word lists of other languages."""
     for file in list(files):
         if file.src_uri.startswith("assets/") and (file.src_uri.endswith(".map") or "/lunr/" in file.src_uri):
             files.remove(file)

@@ -16,6 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 from fastapi.testclient import TestClient
+from versions import needs_ompl
 
 import kin
 from app.cli.parser import subcommands
@@ -69,7 +70,9 @@ def commands() -> list[tuple[str, list[str]]]:
     return found
 
 
-@pytest.mark.parametrize("code", blocks("python"))
+@pytest.mark.parametrize(
+    "code", [pytest.param(code, marks=needs_ompl if "find_way" in code else ()) for code in blocks("python")]
+)
 def test_python_examples_run(code):
     exec(compile(code, "example", "exec"), {})
 
