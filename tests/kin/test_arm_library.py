@@ -37,7 +37,7 @@ FAMILIES = {
     "iiwa7": "srs7",
     "gen3 sawyer baxter": "general7",
     "gantry": "slides3",
-    "rrp prr": "general5",
+    "rrp prr orthogonal3r": "general5",
     "rpp": "slides2",
 }
 FAMILY = {name: family for names, family in FAMILIES.items() for name in names.split()}
@@ -188,6 +188,13 @@ def test_inverse_kinematics_finds_the_way_back(robot):
             assert np.abs(found[:3, across] - T[:3, across]).max(initial=0.0) < 1e-6
 
 
+def orthogonal(q1, q2, q3):
+    """Where the tool is ahead of link 1, beside it and above, turned about axis 1."""
+    out, aside = 0.4 + 0.3 * math.cos(q3), 0.2 + 0.3 * math.sin(q3)
+    ahead, up = 0.2 + out * math.cos(q2), -out * math.sin(q2)
+    return math.cos(q1) * ahead - math.sin(q1) * aside, math.sin(q1) * ahead + math.cos(q1) * aside, up
+
+
 FORMULAS = {
     "rpp": lambda q: (-q[2] * math.sin(q[0]), q[2] * math.cos(q[0]), 0.3 + q[1]),
     "rrp": lambda q: (
@@ -200,6 +207,7 @@ FORMULAS = {
         0.4 * math.sin(q[1]) + 0.3 * math.sin(q[1] + q[2]),
         q[0],
     ),
+    "orthogonal3r": lambda q: orthogonal(*q),
     # The hand of these two reaches 120 and 150 mm past the wrist's point.
     "cylindrical": lambda q: (-q[2] * math.sin(q[0]), q[2] * math.cos(q[0]), 0.3 + q[1]),
     "gantry": lambda q: (-q[2], q[1], q[0]),

@@ -181,12 +181,12 @@ class Guide(Feature):
     def on_robot(self) -> None:
         self._example.close()
         # Other numbers are asked on another arm, and answers stay with theirs.
-        at, outline = self._progress.at, self._outline()
+        at, before, outline = self._progress.at, self._progress.outline, self._outline()
         self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
         self._progress = self._arms.setdefault(self.stage.now.robot, Progress(outline))
         self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
         self._progress.use(outline)
-        self._progress.at = min(at, len(outline.steps))
+        self._progress.at = outline.step_like(before, at)
         self._sheets.clear()
         self._copies.remove()
         self._show()
@@ -273,9 +273,10 @@ class Guide(Feature):
             sheet.fill(value)
         form = question.asked().form
         try:
-            given = (
-                self.stage.now.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
-            )
+            if form == "posture" and self._shown is not None:
+                given = self._shown.driven(question)
+            else:
+                given = sheet.given(form, value, self.stage.units)
             verdict = progress.answer(key, question.read(given))
         except EntryError as error:
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)

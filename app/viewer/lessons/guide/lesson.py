@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from app.exports.worksheet import Formula, Left
 from app.viewer.feature import Feature
-from app.viewer.lessons.guide.outline import Outline
+from app.viewer.lessons.guide.outline import Outline, Question
 from app.viewer.lessons.guide.progress import Progress
 from kin import Robot
 from kin.units import Units
@@ -42,6 +42,10 @@ class Lesson(Feature, ABC):
 
     def on_offer(self) -> None:
         """The button that the step on show offers was pressed."""
+
+    def driven(self, question: Question) -> object:
+        """The answer to a question that is answered by driving the arm: by itself, where the arm is heading."""
+        return self.stage.now.goal.tolist()
 
     @staticmethod
     @abstractmethod

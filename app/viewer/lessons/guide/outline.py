@@ -248,6 +248,13 @@ class Outline:
         step = self.steps[at] if at < len(self.steps) else None
         return self.pose if step is None or step.pose is None else step.pose
 
+    def step_like(self, other: Outline, at: int) -> int:
+        """The index of the step that has the title of another outline's: the nearest one, or that of its check."""
+        if at == len(other.steps):
+            return len(self.steps)
+        alike = [i for i, step in enumerate(self.steps) if step.title == other.steps[at].title]
+        return min(alike, key=lambda i: abs(i - at), default=min(at, len(self.steps)))
+
     def questions(self) -> Iterator[tuple[str, Question]]:
         """Every question with its key: the number of its step, e and this number for an estimate, or c and its
         number in the check."""

@@ -8,6 +8,7 @@ from functools import cached_property
 import kin
 from app.viewer.declared.facts import Facts
 from app.viewer.lessons.postures.directions import Cone
+from app.viewer.lessons.postures.loop import loop_of
 from app.viewer.lessons.postures.remedies import Remedy
 from app.viewer.lessons.postures.settings import PosturesSettings, names_of
 from app.viewer.lessons.postures.survey import CLOSEST, Posture, survey
@@ -33,6 +34,11 @@ class PosturesFacts(Facts[PosturesSettings]):
         """The directions at the target, if they are wanted."""
         found: Cone | None = self.work("cone").value
         return found
+
+    @property
+    def round(self) -> bool:
+        """Whether the arm is to be driven round."""
+        return self.settings.round and loop_of(self.robot) is not None
 
     @property
     def names(self) -> tuple[str, ...]:

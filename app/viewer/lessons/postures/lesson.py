@@ -5,6 +5,9 @@ joint limits, and its manipulability. A click on a ghost, or on its number, move
 missed, the reason and possible remedies are shown. For an arm of five joints, the possible approach directions are
 drawn.
 
+On an arm that shows it, the student drives the tool round a loop that ends in another posture without a
+singularity.
+
 The list is updated at most ten times a second; remedies are searched only when nothing is moving.
 """
 
@@ -21,7 +24,9 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Work
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.postures import remedies
+from app.viewer.lessons.guide.outline import Outline, Question
+from app.viewer.lessons.guide.progress import Progress
+from app.viewer.lessons.postures import loop, remedies
 from app.viewer.lessons.postures.directions import Cone, cone_html, has_cone
 from app.viewer.lessons.postures.facts import PosturesFacts
 from app.viewer.lessons.postures.ghosts import ghosts
@@ -39,6 +44,7 @@ from kin.units import Units
 from kin.warmup import ALL
 
 CONE_INTERVAL = 0.2
+POLL = 0.2  # s between two looks at a map that is computed
 QUIET = 0.25  # seconds without a new result before remedies are searched
 HIDDEN = "\N{WHITE CIRCLE}"
 MOVE_HINT = "Moves the arm to this posture. A click on its ghost does the same."
@@ -55,7 +61,7 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
     about = "All ways to reach a target, and the reason if there is none."
     outline = staticmethod(outline)
     settings_of, facts_of = PosturesSettings, PosturesFacts
-    undo: ClassVar[dict[str, str]] = {"on_go": "Posture", "on_remedy": "Remedy"}
+    undo: ClassVar[dict[str, str]] = {"on_go": "Posture", "on_remedy": "Remedy", "on_way_point": "Way point"}
     pace = 0.1
 
     @staticmethod
@@ -89,7 +95,18 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
                 nodes.append(Html(cone_html, (f.cone.patch.share,), key="share"))
         if not kin.branch_names(robot) and not self.hides("postures"):
             nodes.append(Html(_note, key="unnamed"))
+        if f.round:
+            nodes.append(self._round())
         return nodes
+
+    def _round(self) -> Folder:
+        """The drive, its way points, and the map with it."""
+        f, drive = self.read, self.settings.drive
+        found = f.work("map").value
+        go = {str(i + 1): self.event(self.on_way_point, i) for i in range(loop.POINTS)}
+        plot = () if found is None else (Html(loop.map_html, (found, drive, f.units), key="map"),)
+        words = Html(loop.drive_html, (f.robot, drive, f.units), key="drive")
+        return Folder("The way round", [words, Buttons("Way point", go, loop.WAY_HINT, of=f.robot.id), *plot])
 
     def _toggles(self, numbers: tuple[str, ...]) -> Buttons:
         """A button for each ghost, which are marked while it is hidden."""
@@ -108,6 +125,8 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
             nodes.append(Lazy("ghosts", self._ghosts, (f.robot, f.postures, f.seen - {f.present})))
         if f.cone is not None:
             nodes.append(Lazy("cone", Cone.nodes, (f.cone,)))
+        if (drive := self.settings.drive) is not None and len(drive.corners) > 1:
+            nodes.append(Lazy("drive", loop.path_nodes, (f.robot, drive)))
         return nodes
 
     def _ghosts(self, *args: object) -> list[SceneNode]:
@@ -128,6 +147,13 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
             self.stage.move_to(posture.q, Notice("hand", words, "The tool stays where it was."))
         else:
             self.stage.notify(Notice("limits", f"Not available: {name}", f"{posture.words.capitalize()}."))
+
+    def on_way_point(self, index: int) -> None:
+        """Move the arm to a point of the way round."""
+        points = loop.loop_of(self.read.robot)
+        assert points is not None
+        words = "The joints go straight there from where they are."
+        self.stage.move_to(points[index], Notice("hand", f"Way point {index + 1}", words))
 
     def on_ghost(self, index: int, show: bool) -> None:
         """Show or hide the ghost of a posture."""
@@ -155,6 +181,34 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         self.change(result=result)
         super().on_result(result)
 
+    def started(self) -> None:
+        now = self.stage.now
+        self.change(drive=loop.driven(now.robot, None, now.q) if self.settings.round else None)
+
+    def on_pose(self, T_base_tool: Array) -> None:
+        if self.settings.round and not self._outdated:
+            before = self.settings.drive
+            drive = loop.driven(self.stage.now.robot, before, self.stage.now.q)
+            if drive is not before:
+                self.change(drive=drive)
+        super().on_pose(T_base_tool)
+
+    def on_steps(self, progress: Progress) -> Outline | None:
+        at, steps = progress.at, progress.outline.steps
+        asked = at < len(steps) and isinstance(steps[at].question, loop.Round)
+        if asked != self.settings.round:
+            self.change(round=asked)
+            self.started()
+            self.schedule()
+        return super().on_steps(progress)
+
+    def driven(self, question: Question) -> object:
+        if not isinstance(question, loop.Round):
+            return super().driven(question)
+        now = self.stage.now
+        drive = loop.driven(now.robot, self.settings.drive, now.goal)
+        return (now.goal[None] if drive is None else drive.corners).round(6).tolist()
+
     # Long work
 
     def running(self) -> Sequence[Work]:
@@ -163,6 +217,8 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
             works.append(Work("cone", self._cone, (f.arm.aim,), pace=CONE_INTERVAL, keep=True))
         if f.result is not None and f.result.status != "solved":
             works.append(Work("remedies", self._remedies, (f.result, f.units), rest=QUIET))
+        if f.round:
+            works.append(Work("map", self.stage.summaries.postures, (loop.request(f.robot),), poll=POLL))
         return works
 
     def _cone(self, T: Array) -> Cone:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Configuration, Ghost, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance
 from app.viewer.lessons.postures import planar
+from app.viewer.lessons.postures.loop import Round, loop_of
 from app.viewer.scene.chain import rotation
 from kin import IKOptions, Robot, Status, branch_names, branch_of, fk, jacobian
 from kin.axes import NEARLY
@@ -23,6 +25,7 @@ from kin.units import Units
 
 ROLL = math.radians(30.0)
 BEYOND = 1.2  # lengths of all links: a target that no arm has
+ROUND = "Drive it round"  # the step whose question is made here
 
 
 class Solved(NamedTuple):
@@ -83,7 +86,9 @@ def _exact(robot: Robot, T: Array) -> tuple[Status, tuple[IKSolution, ...]]:
 
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm."""
-    return outline_of("postures", robot, units, facts(robot, units))
+    found = outline_of("postures", robot, units, facts(robot, units))
+    steps = (replace(one, question=Round(robot, units)) if one.title == ROUND else one for one in found.steps)
+    return replace(found, steps=tuple(steps))
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:
@@ -109,6 +114,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "limits": known.roll is Status.LIMITS,
     }
     numbers["reachable"] = bool(known.goal)
+    loop = loop_of(robot)
+    numbers["cuspidal"] = loop is not None
     words = {
         "here": known.here,
         "goal_posture": known.goal,
@@ -126,6 +133,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     home = Pose(as_configuration(robot.q_home))
     poses = {"home": home, "another posture": home if known.other is None else Pose(known.other)}
     poses["beyond"] = Pose(home.q, beyond(robot))
+    if loop is not None:
+        poses["round"] = Pose(as_configuration(loop[-1]))
     if planar.is_planar(robot):
         poses |= planar.poses(robot)
     values = {name: float(value) for name, value in numbers.items()}

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import kin
 from app.viewer.declared.fields import Settings, flag, kept, memory, subset
+from app.viewer.lessons.postures.loop import Drive
 from app.viewer.lessons.postures.survey import CLOSEST
 from kin import IKResult, Robot
 
@@ -26,9 +27,16 @@ def _read_hidden(entry: object, robot: Robot) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class PosturesSettings(Settings):
-    """See the module; `hidden` are the names of the postures without a ghost, `result` is the last answer."""
+    """See the module; `hidden` are the names of the postures without a ghost, `result` is the last answer.
+
+    Attributes:
+        round: whether the step on show asks for the arm to be driven round.
+        drive: what was driven since.
+    """
 
     ghosts: bool = flag("Ghosts", True, hint=ALL_GHOSTS_HINT)
     cone: bool = flag("Approach cone", True, hint=CONE_HINT)
     hidden: frozenset[str] = kept(frozenset(), to_json=sorted, from_json=_read_hidden, renew=True)
     result: IKResult | None = memory()
+    round: bool = memory(False, renew=False)
+    drive: Drive | None = memory()

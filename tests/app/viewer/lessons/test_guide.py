@@ -401,7 +401,7 @@ def test_postures_numbers(robot: Robot) -> None:
 
 @pytest.mark.parametrize("robot", [STORE.get("planar2r"), STORE.get("planar3r")], ids=["2r", "3r"])
 def test_planar_arms_by_hand(robot: Robot) -> None:
-    steps = postures.outline(robot, DEGREES).steps[-4:-1]
+    steps = postures.outline(robot, DEGREES).steps[-5:-2]
     ring, bend, theta = (step.question for step in steps)
     assert isinstance(ring, Number)
     assert isinstance(bend, Number)

@@ -233,7 +233,7 @@ def test_the_cone_contains_the_directions_that_the_solver_reaches() -> None:
 def tab(port: int) -> Iterator[FakeBrowser]:
     with FakeBrowser(port) as opened:
         opened.set("Lesson", "Postures")
-        opened.say("feature", ["guide", ["go", 1], 5])  # the check; the questions before withhold the postures
+        opened.say("feature", ["guide", ["go", 1], 6])  # the check; the questions before withhold the postures
         opened.wait(lambda: "data-posture" in opened.html)
         opened.settle()
         yield opened
