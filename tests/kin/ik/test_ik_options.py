@@ -449,7 +449,7 @@ def test_every_blocked_branch_reports_its_violations(robot_id):
                 assert v.value == branch.q[v.joint]
                 assert v.limit in (robot.lower[v.joint], robot.upper[v.joint])
             overruns.append(sum(abs(v.value - v.limit) for v in branch.violations))
-        assert overruns == sorted(overruns)
+        assert (np.diff(overruns) > -1e-11).all(), "those equally far outside are in the order of the branches"
         assert f"joint {result.violations[0].joint + 1}" in result.reason
     assert blocked >= 10
 
