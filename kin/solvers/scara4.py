@@ -174,8 +174,8 @@ def _branches(
     return miss, -1
 
 
-# Batch kernels: both branches of a pose, without limits, ranges or a choice, see :mod:`kin.solvers.blocks`. Rows
-# of S are θ2, of which the other is −θ2, ψ, and θ1 of both branches; θ3 is what ψ leaves.
+# Both branches of a regular pose, where neither limits nor the seed count, see :mod:`kin.solvers.blocks`. Rows of
+# S are θ2, of which the other is −θ2, ψ, and θ1 of both branches; θ3 is what ψ leaves.
 _BEND, _SUM, _UPPER, _END = OWN, OWN + 1, OWN + 2, OWN + 4
 _PAIRS, _HEIGHT, _ROWS = _END - OWN, _END + _END - OWN, _END + _END - OWN + 2
 _REST = _PAIRS + _UPPER  # θ3

@@ -18,8 +18,9 @@ import kin
 from kin import Joint, Robot, Status, solve_ik
 from kin.files import parse_robot
 from kin.solvers import closed_form_of, parallel6, scara4, slide6, wrist6
-from kin.solvers.contract import POSE, SolverInput
 from kin.solvers.numeric import spread
+from kin.solvers.parallel6.branches import solve as solve_parallel6
+from kin.solvers.wrist6.branches import solve as solve_wrist6
 
 PI = math.pi
 FAMILIES = {"wrist6": wrist6, "parallel6": parallel6, "slide6": slide6, "scara4": scara4}
@@ -266,11 +267,17 @@ def mixture(robot, rng):
     return T[rng.permutation(150)]
 
 
+CAREFUL = {
+    "wrist6": solve_wrist6, "slide6": solve_wrist6, "parallel6": solve_parallel6, "scara4": scara4._careful,
+}  # fmt: skip
+
+
 def careful(robot, T):
-    """The branches of one target by the kernel that also handles limits and ranges, without limits."""
-    form = closed_form_of(robot)
-    far = np.full(robot.n, 1e6)
-    return form.solve(SolverInput(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
+    """The branches of one target by the careful kernel, of regular targets too, without limits."""
+    form, far = closed_form_of(robot), np.full(robot.n, 1e6)
+    out, pose = np.empty((len(form.branches), robot.n)), np.ascontiguousarray(T)
+    CAREFUL[form.name](form.kernels.params, pose, math.nan, robot.q_home.copy(), -far, far, np.empty((0, 3)), out)
+    return out
 
 
 @pytest.mark.full
