@@ -69,7 +69,15 @@ def _beyond_limits(problem: IKProblem, code: int) -> tuple[BlockedBranch, ...]:
     branch = [problem.branch_of(row) for row in q]
     allowed = np.array([problem.allows(i) for i in branch])
     rows = is_closed(problem, stats) & (stats[:, OVERRUN] > 0.0) & allowed
-    return _blocked(problem, q, by_key(q, rows, stats[:, OVERRUN]), branch)
+    return _blocked(problem, q, _by_overrun(q, rows, stats), branch)
+
+
+def _by_overrun(q: Array, rows: Flags, stats: Array) -> list[int]:
+    """The flagged rows of q ``(k, n)``, the least outside the limits first, and the first of those equally far.
+
+    Rounding must not decide between them. Generated code does the same, see `kin.codegen.entries`.
+    """
+    return by_key(q, rows, stats[:, OVERRUN].round(12))
 
 
 def outside_by_descent(problem: IKProblem) -> IKResult | None:
@@ -115,8 +123,7 @@ def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Fl
     closest = nearest.closest(problem, branches.q)
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
-    # Rounding must not decide between postures that are equally far outside.
-    order = by_key(branches.q, rows, branches.stats[:, OVERRUN].round(12))
+    order = _by_overrun(branches.q, rows, branches.stats)
     blocked = _blocked(problem, branches.q, order, range(len(branches.q)))
     redundancy = with_further(branches, redundancy_of(problem, branches, order[:1], rows)[1])
     names = [parameter.name for parameter in problem.requested]
@@ -169,7 +176,7 @@ def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResu
         return out_of_reach(problem, branches)
     blocked: tuple[BlockedBranch, ...] = ()
     if not rows.any() and possible.any():
-        order = by_key(approach_q, possible, approach_stats[:, OVERRUN])
+        order = _by_overrun(approach_q, possible, approach_stats)
         blocked = _blocked(problem, approach_q, order, range(len(approach_q)))
     return _compromised(problem, solutions, blocked, branches.q)
 

@@ -18,6 +18,7 @@ from playwright._impl._driver import compute_driver_executable
 import kin
 from kin.codegen import c, entries, files, js
 from kin.codegen.arm import arm_of
+from kin.ik.candidates import OVERRUN, ROLL, Rows
 from kin.solvers import closed_form_of
 
 QUICK_C, QUICK_JS = "ur5", "pioneer5"
@@ -121,6 +122,34 @@ def test_c_answers_as_the_core_does(robot_id, tmp_path):
     assert names == [files._ascii(each) for each in arm.form.branches]
     check_refusals(built)
     check_nearest(built, asked)
+
+
+def test_of_postures_equally_far_outside_the_limits_the_first_branch_is_named_first(tmp_path):
+    robot, rng = kin.get_robot("stanford"), np.random.default_rng(5)
+    built = compiled(arm_of(robot, closest=False), tmp_path, "-O0")
+    names = [files._ascii(each) for each in built.arm.form.branches]
+    tied = 0
+    for q in robot.random_q(rng, 30):
+        q[1] = robot.upper[1] + rng.uniform(0.1, 0.15)
+        T = kin.fk(robot, q)
+        expected = kin.solve_ik(robot, T)
+        status, _, _, branches = built.ik(T, robot.q_home)
+        assert (status, expected.status.value) == ("limits", "limits")
+        assert [names[k] for k in branches] == [files._ascii(each.branch) for each in expected.blocked]
+        outside = [sum(abs(v.value - v.limit) for v in each.violations) for each in expected.blocked]
+        first = [k for k, each in zip(branches, outside, strict=True) if each < outside[0] + 1e-13]
+        assert first == sorted(first)
+        tied += len(first) > 1
+    assert tied > 5
+
+
+@pytest.mark.parametrize(("column", "order"), [(OVERRUN, [2, 0, 1]), (ROLL, [2, 1, 0])])
+def test_rounding_does_not_decide_between_postures_outside_the_limits(column, order):
+    stats, closed = np.zeros((4, 5)), np.array([True, True, True, False])
+    stats[:, column] = 0.1 + 0.2, 0.3, 0.3 - 1e-11, math.nan
+    rows = Rows(np.arange(4.0)[:, None], stats, closed, closed, np.empty(4, np.int64))
+    assert entries._ordered(rows, column) == 3
+    assert rows.order[:3].tolist() == order
 
 
 def check_refusals(built: Built):

@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 
 import kin
 from kin import IKOptions, InputError, JointConstraints, Status, solve_ik
+from kin.ik import failures
+from kin.ik.candidates import OVERRUN
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 from kin.units import Units
 
@@ -818,6 +820,13 @@ def test_the_shared_neighbours_of_a_limit_are_all_named():
     assert result.status is Status.LIMITS
     assert "One other posture is outside the limits too." in result.reason
     assert {len(b.violations) for b in result.blocked} == {1}
+
+
+def test_rounding_does_not_decide_between_postures_outside_the_limits():
+    stats = np.zeros((4, 5))
+    stats[:, OVERRUN] = 0.1 + 0.2, 0.3, 0.3 - 1e-11, math.nan
+    there = np.array([True, True, True, False])
+    assert failures._by_overrun(np.arange(4.0)[:, None], there, stats) == [2, 0, 1]
 
 
 @pytest.mark.parametrize("value", [1e154, 1e12, -1e7])

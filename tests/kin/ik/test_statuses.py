@@ -74,7 +74,7 @@ def test_a_target_beyond_a_stop_names_the_stop(robot, task):
                     np.flatnonzero((posture.q < robot.lower) | (posture.q > robot.upper)).tolist()
                 )
             totals = [sum(abs(v.value - v.limit) for v in posture.violations) for posture in result.blocked]
-            assert totals == sorted(totals)
+            assert np.diff(totals).min(initial=0.0) > -2e-12  # rounding does not decide
             assert result.closest is not None
     assert blocked >= 3
 
