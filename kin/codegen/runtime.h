@@ -51,7 +51,8 @@ static inline int64_t shift_left(int64_t a, int64_t n) { return n < 64 ? (int64_
 static inline int64_t bits_of(double x) { int64_t b; memcpy(&b, &x, sizeof b); return b; }
 static inline double float_of(int64_t b) { double x; memcpy(&x, &b, sizeof x); return x; }
 // Sine, cosine and arc tangent as kin.kernels.simd has them: no jumps, a dozen multiplications, at most 2.4 ulp off.
-#if defined(FP_FAST_FMA) || defined(__FMA__) || defined(__ARM_FEATURE_FMA) // the first is not in clang
+// FP_FAST_FMA is not in clang. Of Arm, bit 3 of __ARM_FP is double precision: a Cortex-M4 fuses floats alone.
+#if defined(FP_FAST_FMA) || defined(__FMA__) || (defined(__ARM_FEATURE_FMA) && (__ARM_FP & 8))
 KINBOARD_INLINE double fused(double a, double b, double c) { return fma(a, b, c); }
 #else
 KINBOARD_INLINE double fused(double a, double b, double c) { return a * b + c; }

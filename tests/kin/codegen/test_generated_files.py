@@ -344,6 +344,24 @@ def test_what_would_make_wrong_answers_is_an_error_of_the_compiler(tmp_path):
         assert words in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("defined", "fused"),
+    [
+        ([], False),
+        (["-D__FMA__"], True),
+        (["-D__ARM_FEATURE_FMA", "-D__ARM_FP=6"], False),  # a Cortex-M4
+        (["-D__ARM_FEATURE_FMA", "-D__ARM_FP=14"], True),
+    ],
+)
+def test_operations_are_fused_where_the_processor_does_so_in_double(defined, fused, tmp_path):
+    file = tmp_path / "runtime.c"
+    file.write_text(c.RUNTIME)
+    none = ["-U__FP_FAST_FMA", "-U__FMA__", "-U__ARM_FEATURE_FMA", "-U__ARM_FP"]
+    command = ["gcc", "-std=c99", "-E", *none, *defined, file]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert ("return fma(a, b, c)" in done.stdout) == fused
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("robot_id", ["pioneer5", "irb120", "panda", "redundant7-craig"])
 def test_vectors_check_the_file_and_notice_a_wrong_one(robot_id, tmp_path):
