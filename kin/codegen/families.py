@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from types import FunctionType
 from typing import Any, NamedTuple
 
@@ -232,7 +233,7 @@ def alone(robot: Robot, form: ClosedForm | None) -> Alone:
             robot.id,
             f"a table with exact numbers: this one is near an arm of the family {form.name}, but off by "
             f"{form.off:.1g} rad or of the arm's size, so that every posture is refined on the table as entered. "
-            f"Write {_exact(robot) or 'angles such as pi/2 and lengths with all their digits, or 0'}",
+            f"Write {_exact(robot)}",
         )
     if family := next((each for each in type(form).__mro__ if each in KERNELS), None):
         rows, inner = KERNELS[family]
@@ -246,9 +247,15 @@ def alone(robot: Robot, form: ClosedForm | None) -> Alone:
 
 
 def _exact(robot: Robot) -> str:
-    """The numbers of a rounded table that are near right angles or zero, and what they have to be."""
-    found = []
-    for row in robot.rows:
+    """What to write exactly in a rounded table: its numbers near right angles or 0.
+
+    Without those before the first axis, which only place the base. Not all of the others have to be exact: offsets
+    along parallel axes are added up.
+    """
+    rows, found = list(robot.rows[robot.joint_rows[0] :]), []
+    if robot.convention == "modified":
+        rows[0] = replace(rows[0], a=0.0, alpha=0.0)
+    for row in rows:
         angles = {"alpha": row.alpha, **({} if row.kind == "revolute" else {"theta": row.theta})}
         for name, value in angles.items():
             quarters = round(value / _RIGHT)
@@ -258,7 +265,9 @@ def _exact(robot: Robot) -> str:
         found += [
             f"{name} of {row.name} as 0" for name, x in lengths.items() if 0.0 < abs(x) < _TINY * size(robot)
         ]
-    return ", ".join(found)
+    if not found:
+        return "angles such as pi/2 and lengths with all their digits, or 0"
+    return f"the numbers near right angles or 0 exactly: {', '.join(found)}"
 
 
 def needs_python(robot: Robot, form: ClosedForm) -> InputError:

@@ -18,6 +18,7 @@ from playwright._impl._driver import compute_driver_executable
 import kin
 from kin.codegen import c, entries, files, js
 from kin.codegen.arm import arm_of
+from kin.dh.tables import convert_dh
 from kin.ik.candidates import OVERRUN, ROLL, Rows
 from kin.solvers import closed_form_of
 
@@ -50,13 +51,31 @@ def test_an_arm_that_cannot_be_emitted_is_refused_with_why(arm):
     assert "\\" not in str(refused.value)
 
 
+def typed(robot_id):
+    """An arm whose right angles are rounded."""
+    return kin.load_robot(kin.robot_to_toml(robot_id).replace("90", "89.999").replace('id = "', 'id = "typed-'))
+
+
 def test_a_table_that_is_near_a_family_is_refused_and_never_emitted_as_that():
-    text = kin.robot_to_toml("puma560").replace("90", "89.999").replace('id = "', 'id = "typed-')
-    robot = kin.load_robot(text)
-    words = r"exact numbers.*Write alpha of .+? as -?pi/2 \(-?90°\), alpha of"
+    robot = typed("puma560")
+    words = r"exact numbers.*numbers near right angles or 0 exactly: alpha of .+? as -?pi/2 \(-?90°\), alpha of"
     with pytest.raises(kin.InputError, match=words) as refused:
         kin.generate(robot)
     assert str(refused.value).count("alpha of ") == sum(abs(row.alpha) > 1.0 for row in robot.rows)
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_numbers_before_the_first_axis_have_not_to_be_exact(convention):
+    """They only place the base."""
+    robot = typed("puma560")
+    if convention == "modified":
+        robot = convert_dh(robot, convention)
+        rows = (dataclasses.replace(robot.rows[0], a=1e-6, alpha=math.radians(89.999)), *robot.rows[1:])
+    else:
+        rows = (kin.Joint("stand", 0.0, 0.0, 1e-6, math.radians(89.999), "fixed"), *robot.rows)
+    with pytest.raises(kin.InputError, match="exactly: alpha of") as refused:
+        kin.generate(dataclasses.replace(robot, rows=rows))
+    assert f" of {rows[0].name} " not in str(refused.value)
 
 
 @pytest.mark.parametrize(
