@@ -165,6 +165,10 @@ class VisitorPage(ShownArm, Worker):
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         self.arm.move_to(q, ease=not at_once)
         self.status.show(notice or BY_HAND)
+        if at_once and not self.arm.playing and self._persistence.due is None:
+            # A frame of a motion that goes on after its beginning was stored: no event tells of its end.
+            self._actions.history.proceed()
+            self._persistence.postpone(time.perf_counter())
 
     def show_own(self, own: OwnArm) -> None:
         self.own = own

@@ -21,6 +21,7 @@ from app.shared.store import Store
 from app.shared.summaries import NODES, PostureRequest, Summaries
 from app.viewer.lessons.postures.survey import Posture
 from app.viewer.server import ViewerServer
+from app.viewer.session.state import KEY, KEY_REPLACE, decode
 from app.viewer.tabs.workspace.postures import views
 from app.viewer.tabs.workspace.postures.panel import Postures
 from app.viewer.tabs.workspace.postures.settings import PostureSettings
@@ -280,6 +281,25 @@ def test_the_loop_of_a_cuspidal_arm_is_driven_round(page, verdict):
     assert page.notices[-1].title == "The tool is back in another posture"
     assert "Joint 4 is 17.2° from where it was" in page.notices[-1].detail
     assert "Play the loop" in words(page)
+
+
+@pytest.mark.full
+def test_the_link_has_the_end_of_the_loop_and_undo_its_beginning(tab, verdict):
+    tab.set("Cuspidal or not", True)
+    tab.wait(lambda: "stays above 0.02" in tab.html)
+    tab.stored()
+    tab.kept.clear()
+    tab.kept_as.clear()
+    tab.set("Play the loop", True)
+
+    def kept(q: np.ndarray) -> bool:
+        return bool(tab.kept) and np.allclose(decode(tab.kept[-1], STORE.robots).q, q, atol=1e-6)
+
+    tab.wait(lambda: kept(LOOP[-1]))
+    assert tab.kept_as[0] == KEY
+    assert set(tab.kept_as[1:]) <= {KEY_REPLACE}, "one entry of the browser's history"
+    tab.say("undo")
+    tab.wait(lambda: kept(UR5.q_home))
 
 
 def test_another_motion_of_the_arm_ends_the_loop(page, verdict):
