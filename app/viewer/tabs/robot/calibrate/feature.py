@@ -33,6 +33,7 @@ from app.viewer.tabs.robot.calibrate.run import (
     Run,
     Touch,
     Touched,
+    doubt,
     from_json,
     planned,
     read_joints,
@@ -308,7 +309,14 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         """Show a posture; what is typed for the one before is taken. Raises `InputError`: it cannot be read."""
         if self.settings.joints.strip() and self.settings.joints != self._written(self._run):
             self.on_take()
+            self._question(self._run)
         self._show(self._run.to(at))
+
+    def _question(self, run: Run) -> None:
+        """Say so if what was read in the posture on show is far from it: the next one takes its place."""
+        read = run.read[run.at]
+        if read is not None and (words := doubt(run.robot, run.q[run.at], read)):
+            self.stage.notify(Notice("advice", f"Posture {run.at + 1} is in doubt", words))
 
     def on_report(self) -> None:
         """Save what was found as one page."""

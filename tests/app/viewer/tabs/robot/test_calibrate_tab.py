@@ -330,6 +330,18 @@ def test_what_is_typed_is_never_a_reading_of_the_next_posture(page: Page, run: R
     assert [each.at for each in page.run.touches] == [0] * len(expected)
 
 
+def test_a_value_far_from_its_posture_is_questioned_by_next_too(page: Page, run: Run) -> None:
+    begun(page, run)
+    for i, (turn, title) in enumerate(((1.0, "Posture 1 is in doubt"), (0.1, ""))):
+        q = tuple(run.q[i] + turn * np.eye(6)[1])
+        page.set("Joint values", typed(q))
+        page.page.notices.clear()
+        page.set("Touch", "Next")
+        assert page.run.at == i + 1
+        said = [(one.title, one.detail) for one in page.page.notices]
+        assert said == ([(title, doubt(UR5E, run.q[i], q))] if title else [])
+
+
 def test_a_reload_loses_nothing(page: Page, run: Run, read: list[tuple[float, ...]]) -> None:
     assert page.feature.state() == {}
     begun(page, run.with_read(read[0]).to(1))
