@@ -168,6 +168,8 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
             stage.notify(held)
         elif shown.keeps_tool:
             self.change(drive=Drive(shown.q))
+            self.invalidate()
+            self._go_on_driving(FRAME)  # in the press, which is a step that can be undone
         else:
             self.change(leaving=None)
             stage.move_to(shown.q[-1], left(found, shown, stage.units))

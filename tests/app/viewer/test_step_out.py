@@ -152,6 +152,15 @@ def drive(page: BarePage) -> tuple[StepOut, kin.escape.Exits]:
     return feature, found
 
 
+def test_the_press_itself_moves_the_arm_so_that_undo_takes_the_way_back(page: BarePage) -> None:
+    page.use(STORE.get("iiwa14"))
+    found = step_out(page, UPRIGHT)
+    assert page.feature is not None
+    page.feature.handle(("drive", 1), None)
+    assert any(np.array_equal(page.now.goal, q) for q in found.exits[0].q[1:])
+    assert page.notices[-1].title == "Stepping out"
+
+
 def test_the_status_says_that_the_arm_is_out_at_the_end_of_the_way_alone(page: BarePage) -> None:
     _, found = drive(page)
     page.rest()

@@ -319,6 +319,14 @@ def test_a_loop_outside_the_limits_is_said_and_not_driven(page, verdict):
     assert "Play the loop" not in words(page)
 
 
+def test_the_press_itself_goes_on_from_the_start_of_the_loop(page, verdict):
+    judged(page)
+    page.pose(LOOP[0])
+    page.feature.on_loop()
+    assert page.feature.settings.loop.passed > 0
+    assert np.array_equal(page.now.goal, page.feature.settings.loop.here)
+
+
 def test_an_arm_that_is_not_cuspidal_says_why(page):
     judged(page)
     assert "Not cuspidal: each posture is a combination of signs" in words(page)

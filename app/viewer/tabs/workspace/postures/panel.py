@@ -257,6 +257,8 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         if found is not None and found.loop is not None:
             self.change(loop=Drive.straight(found.loop))
             self.stage.move_to(found.loop[0], START)
+            self.invalidate()
+            self._play(FRAME)  # if it is there already: the press is a step that can be undone
 
     def on_stop(self) -> None:
         """Leave the arm where it is on the loop."""
