@@ -203,6 +203,11 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self.refresh()
         self.due = 0.0
 
+    def on_activity(self) -> None:
+        super().on_activity()
+        self._postures.on_activity()
+        self.due = 0.0
+
     def on_pose(self, T_base_tool: Array) -> None:
         self._moved = time.perf_counter()
         self._postures.on_pose(T_base_tool)

@@ -25,6 +25,7 @@ from app.viewer.session.state import KEY, KEY_REPLACE, decode
 from app.viewer.tabs.workspace.postures import views
 from app.viewer.tabs.workspace.postures.panel import Postures
 from app.viewer.tabs.workspace.postures.settings import PostureSettings
+from app.viewer.tabs.workspace.tab import Workspace
 from kin.angles import wrapped
 from kin.units import DEFAULT_UNITS
 
@@ -218,6 +219,25 @@ def test_an_arm_whose_postures_have_no_names_shows_them_all(page):
 def test_a_click_that_is_none_is_refused(page, value):
     with pytest.raises(kin.InputError, match="map"):
         page.feature.heard(("map", 1), value)
+
+
+def test_postures_that_a_question_asks_for_are_hidden_in_the_tab(page):
+    page.feature.remove()
+    tab = page.open(Workspace)
+    page.press("Posture map", "Start")
+    page.rest()
+    request = tab._postures.settings.request
+    found = page.summaries.postures(request).future.result(60.0)
+    page.rest()
+    i, j = np.argwhere(found.counts == 8)[0].tolist()
+    page.post(("feature", "workspace", ("map", 1)), list(at_node(found, i, j)))
+    page.rest()
+    for asked, count in ((False, 8), (True, 0), (False, 8)):
+        page.activity.withheld = frozenset({"postures"} if asked else ())
+        tab.on_activity()
+        page.rest()
+        assert ghosts(page) == count
+        assert ("Go to posture" in words(page)) is not asked
 
 
 def test_a_late_click_does_nothing(page):
