@@ -99,7 +99,7 @@ class ExitFacts(Facts[ExitSettings]):
         if self.settings.drive is not None:
             return _card("", STAY)
         if found is None:
-            return _card("The ways out are searched …")
+            return _card("The ways out are searched …", STAY)
         if shown is None:
             return _card(indexed(typeset(found.explain(self.units))), STAY)
         which = f"{found.exits.index(shown) + 1} of {len(found.exits)}" if len(found.exits) > 1 else "out"

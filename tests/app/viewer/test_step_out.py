@@ -102,6 +102,16 @@ def test_the_ways_out_are_said_and_drawn_before_one_is_driven(page: BarePage) ->
     assert not words(page)
 
 
+def test_the_search_can_be_left(page: BarePage, monkeypatch: pytest.MonkeyPatch) -> None:
+    page.use(page.now.robot, WRIST)
+    page.open(StepOut)
+    monkeypatch.setattr(ExitFacts, "exits", None)
+    press(page, "find")
+    assert "are searched" in words(page)
+    press(page, "stay")
+    assert buttons(page) == ["find"]
+
+
 def test_the_way_after_the_last_is_the_first(page: BarePage) -> None:
     step_out(page, WRIST)
     press(page, "next")
