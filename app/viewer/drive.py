@@ -9,11 +9,15 @@ from typing import Self
 
 import numpy as np
 
+from app.viewer.arm import Arm
+from app.viewer.panel.joints import label
+from app.viewer.panel.status import Notice
 from kin.transforms import Array
 
 FRAME = 1 / 30  # s
 FASTEST = 0.5  # rad/s or m/s of the quickest joint
 _STEP = 0.004  # rad or m between waypoints of straight motions
+_MOVES = 1e-6  # rad or m
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,3 +56,10 @@ class Drive:
         covered = np.cumsum(np.abs(np.diff(self.q[self.passed :], axis=0)).max(axis=1))
         more = max(int(np.searchsorted(covered, FASTEST * seconds, side="right")), 1)
         return replace(self, passed=min(self.passed + more, len(self.q) - 1))
+
+
+def locked(arm: Arm, q: Array) -> Notice | None:
+    """What keeps an arm from going from where it is to waypoints ``(k, n)``: a locked joint; None: nothing."""
+    moves = np.ptp(np.vstack([arm.goal, q]), axis=0) > _MOVES  # also of a joint that comes back
+    held = [label(arm.robot, i) for i, lock in enumerate(arm.locks) if lock and moves[i]]
+    return Notice("limits", "Not moved: a joint is locked", f"Unlock {held[0]} first.") if held else None

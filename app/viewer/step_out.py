@@ -13,14 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from app.exports.worksheet.sheet import indexed
-from app.viewer.arm import Arm
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings, memory
 from app.viewer.declared.scene import Color, Node
 from app.viewer.declared.work import Sweep, Work
-from app.viewer.drive import FRAME, Drive
-from app.viewer.panel.joints import label
+from app.viewer.drive import FRAME, Drive, locked
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
@@ -37,7 +35,6 @@ FINDING = ("feature", "step-out", ("find", 0))  # what another feature posts to 
 COLOR: Color = (0, 158, 115)
 OPACITY = 0.45
 REST = 0.2  # s for which the arm rests before it is looked at
-_MOVES = 1e-6  # rad or m
 STEP_HINT = (
     "Looks for the shortest motion out of this singularity, and draws where it leads before you drive there"
 )
@@ -164,7 +161,7 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
         shown, found, stage = self.facts.exit, self.facts.exits, self.stage
         if shown is None or found is None:
             return
-        if (held := locked(stage.now, shown)) is not None:
+        if (held := locked(stage.now, shown.q)) is not None:
             stage.notify(held)
         elif shown.keeps_tool:
             self.change(drive=Drive(shown.q))
@@ -185,6 +182,10 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
             if here:
                 self.stage.notify(CHANGED)
             return
+        if (held := locked(self.stage.now, drive.q[drive.passed :])) is not None:
+            self.change(drive=None, leaving=None)
+            self.stage.notify(held)
+            return
         drive = drive.after(seconds)
         self.change(drive=drive)
         notice = left(found, way, self.stage.units) if drive.arrived else DRIVEN
@@ -196,13 +197,6 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
 def is_singular(robot: Robot, q: Array) -> bool:
     """Whether a configuration ``(n,)`` costs the arm a motion."""
     return any(each.kind != "algorithmic" for each in singularities_at(robot, q, TOLERANCES.at_singularity))
-
-
-def locked(arm: Arm, shown: Exit) -> Notice | None:
-    """What keeps the arm from a way out: a joint that is locked and would have to move; None: nothing."""
-    moves = np.ptp(shown.q, axis=0) > _MOVES  # also of a joint that comes back
-    held = [label(arm.robot, i) for i, lock in enumerate(arm.locks) if lock and moves[i]]
-    return Notice("limits", "Not moved: a joint is locked", f"Unlock {held[0]} first.") if held else None
 
 
 def left(found: Exits, shown: Exit, units: Units) -> Notice:

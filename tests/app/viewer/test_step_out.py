@@ -15,10 +15,10 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.summaries import Summaries
 from app.viewer.arm import Arm
+from app.viewer.drive import locked
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.session.state import PageState, encode
-from app.viewer.step_out import FINDING, ExitFacts, StepOut, is_singular, left, locked
-from kin.escape import Exit
+from app.viewer.step_out import FINDING, ExitFacts, StepOut, is_singular, left
 
 WRIST = np.array([0.3, -1.2, 1.4, -0.7, 0.0, 0.2])  # of a UR5e
 UPRIGHT = np.array([0.1, 0.0, np.pi / 2, -1.2, 0.3, 1.0, 0.4])  # of an iiwa
@@ -192,6 +192,16 @@ def test_who_stays_on_the_way_is_not_said_to_be_out(page: BarePage) -> None:
     assert page.notices[-1].title == "Stopped on the way out"
 
 
+def test_a_joint_that_is_locked_on_the_way_ends_it(page: BarePage) -> None:
+    feature, found = drive(page)
+    moves = int(np.ptp(found.exits[0].q, axis=0).argmax())
+    at = page.now.goal
+    page.pose(at, locks=tuple(i == moves for i in range(7)))
+    assert np.array_equal(page.now.goal, at)
+    assert feature.settings.drive is None
+    assert page.notices[-1].title == "Not moved: a joint is locked"
+
+
 def test_a_way_that_is_none_any_more_is_not_driven_on(page: BarePage, monkeypatch: pytest.MonkeyPatch) -> None:
     feature, found = drive(page)
     at = page.now.goal
@@ -231,10 +241,9 @@ def test_a_locked_joint_that_would_come_back_is_not_moved_either() -> None:
     q = np.zeros((3, 6))
     q[1, 1] = 0.2
     q[:, 4] = 0.0, 0.1, 0.3
-    way = Exit(q, 0.1, True, 0.0, 0.0, 0.0, None, 0.4)
     for joint, said in ((1, "Unlock 2 shoulder first."), (3, None)):
         arm = Arm(STORE.get("ur5e"), q[0], q[0], locks=tuple(i == joint for i in range(6)))
-        found = locked(arm, way)
+        found = locked(arm, q[1:])
         assert (found and found.detail) == said
 
 

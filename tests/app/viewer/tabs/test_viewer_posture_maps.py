@@ -205,6 +205,34 @@ def test_a_region_of_a_plane_of_joints_is_gone_to(page):
     assert not any(kind.startswith("Image") for kind, _, _ in page.scene()), "it lies nowhere in the scene"
 
 
+def locks(joint: int) -> tuple[bool, ...]:
+    return tuple(i == joint for i in range(6))
+
+
+def test_a_locked_joint_is_not_moved(page, verdict):
+    found = mapped(page, "joints")
+    i, j = np.argwhere(found.counts > 0)[0].tolist()
+    judged(page)
+    page.use(UR5, locks=locks(1))
+    click(page, *at_node(found, i, j))
+    page.press("Play the loop")
+    page.rest()
+    assert [one.detail for one in page.notices] == ["Unlock 2 shoulder first."] * 2
+    assert page.feature.settings.loop is None
+    assert np.array_equal(page.now.goal, UR5.q_home)
+
+
+def test_a_posture_that_would_move_a_locked_joint_is_not_driven_to(page):
+    found = mapped(page)
+    i, j = np.argwhere(found.counts == 8)[0].tolist()
+    there = click(page, *at_node(found, i, j))
+    turned = next(k for k, one in enumerate(there) if one.available and abs(one.q[4] - UR5.q_home[4]) > 0.1)
+    page.use(UR5, locks=locks(4))
+    page.feature.on_posture(turned)
+    assert page.notices[-1].detail == "Unlock 5 wrist 2 first."
+    assert np.array_equal(page.now.goal, UR5.q_home)
+
+
 def test_an_arm_whose_postures_have_no_names_shows_them_all(page):
     robot = STORE.get("crx10ia")
     page.change(robot)
@@ -330,6 +358,17 @@ def test_another_motion_of_the_arm_ends_the_loop(page, verdict):
     page.pose(UR5.q_home)
     assert page.feature.settings.loop is None
     assert np.array_equal(page.now.goal, UR5.q_home)
+
+
+def test_a_joint_that_is_locked_on_the_loop_ends_it(page, verdict):
+    judged(page)
+    page.feature.on_loop()
+    page.feature._play(0.1)
+    at = page.now.goal
+    page.pose(at, locks=locks(3))
+    assert page.feature.settings.loop is None
+    assert np.array_equal(page.now.goal, at)
+    assert page.notices[-1].detail.startswith("Unlock 4 ")
 
 
 def test_a_loop_outside_the_limits_is_said_and_not_driven(page, verdict):

@@ -19,7 +19,7 @@ from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, No
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Sweep, Work
-from app.viewer.drive import FRAME, Drive
+from app.viewer.drive import FRAME, Drive, locked
 from app.viewer.lessons.postures import survey
 from app.viewer.lessons.postures.ghosts import ghosts
 from app.viewer.panel.posture import short
@@ -30,6 +30,7 @@ from app.viewer.tabs.workspace.postures.settings import PostureSettings
 from kin import InputError, JointConstraints, Robot
 from kin.angles import apart
 from kin.postures import Cuspidality, PostureMap
+from kin.transforms import Array
 from kin.units import typeset
 
 ABOUT = (
@@ -229,7 +230,14 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
             self.stage.set_target(found.plane.poses(found.robot, np.array([place]))[0])
         else:
             q = found.plane.configurations(np.array([place]))[0]
-            self.stage.move_to(q, Notice("hand", "Moved to a place in the map", "Two joints have its values."))
+            self._move(q, Notice("hand", "Moved to a place in the map", "Two joints have its values."))
+
+    def _move(self, q: Array, notice: Notice) -> None:
+        """Move the arm to a configuration ``(n,)``, or say which joint is locked."""
+        if (held := locked(self.stage.now, q)) is not None:
+            self.stage.notify(held)
+        else:
+            self.stage.move_to(q, notice)
 
     def on_posture(self, index: int) -> None:
         """Move the arm to a posture of the list, or say why it cannot go there."""
@@ -238,7 +246,7 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         posture = self.settings.postures[index]
         if posture.available and posture.q is not None:
             words = f"Posture {index + 1}: {short(posture.name)}"
-            self.stage.move_to(posture.q, Notice("hand", words, "The tool is at the place in the map."))
+            self._move(posture.q, Notice("hand", words, "The tool is at the place in the map."))
         else:
             words = f"Not available: {short(posture.name)}"
             self.stage.notify(Notice("limits", words, "It is outside the limits."))
@@ -254,7 +262,11 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
     def on_loop(self) -> None:
         """Move to the start of the loop, and go round it."""
         found = self.facts.drivable
-        if found is not None and found.loop is not None:
+        if found is None or found.loop is None:
+            return
+        if (held := locked(self.stage.now, found.loop)) is not None:
+            self.stage.notify(held)
+        else:
             self.change(loop=Drive.straight(found.loop))
             self.stage.move_to(found.loop[0], START)
             self.invalidate()
@@ -269,6 +281,9 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         arm, drive, found = self.stage.now, self.settings.loop, self.facts.drivable
         if drive is None or found is None or not np.array_equal(drive.here, arm.goal):
             self.change(loop=None)
+        elif (held := locked(arm, drive.q[drive.passed :])) is not None:
+            self.change(loop=None)
+            self.stage.notify(held)
         elif np.array_equal(arm.q, arm.goal):  # it has come to the start
             drive = drive.after(seconds)
             self.change(loop=None if drive.arrived else drive)
