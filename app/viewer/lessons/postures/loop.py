@@ -35,7 +35,7 @@ from kin.units import Units, general, typeset
 POINTS = 4  # way points, home and the other posture among them
 SAME = 1e-5  # rad: configurations are the same
 NEAR = 0.03  # of the reach: the tool is back, as near as sliders bring it with a mouse
-OTHER = 0.2  # rad: postures differ by more
+OTHER = 0.2  # rad: exact postures differ by more
 AHEAD = math.cos(math.radians(10.0))  # a motion that turns by less has no corner
 MOST = 200  # corners
 SAMPLES = 16  # places of the tool between two corners
@@ -50,6 +50,14 @@ WAY_HINT = "Moves the arm to a way point: 1 is home, 4 another posture with the 
 
 
 @lru_cache(maxsize=64)
+def _postures(robot: Robot) -> tuple[Array, ...]:
+    """All postures that have the tool point exactly where it is at home, home among them."""
+    home = robot.q_home
+    found = solve(robot, fk(robot, home)[:3, 3], IKOptions(task="position"), home)
+    return tuple(each.q for each in found.solutions)
+
+
+@lru_cache(maxsize=64)
 def loop_of(robot: Robot) -> Array | None:
     """Way points ``(4, 3)`` on the straight motion of the joints from home to another posture of the tool point.
 
@@ -61,9 +69,9 @@ def loop_of(robot: Robot) -> Array | None:
     if not (turns and upright) or usual_rank(robot, "position") < 3:
         return None
     home = robot.q_home
-    for other in solve(robot, fk(robot, home)[:3, 3], IKOptions(task="position"), home).solutions:
-        if apart(other.q, home) > OTHER and verified(robot, home, other.q) > 0.0:
-            points: Array = np.linspace(home, other.q, POINTS)
+    for other in _postures(robot):
+        if apart(other, home) > OTHER and verified(robot, home, other) > 0.0:
+            points: Array = np.linspace(home, other, POINTS)
             points.flags.writeable = False
             return points
     return None
@@ -112,9 +120,15 @@ def tool_path(robot: Robot, corners: Array) -> Array:
 
 
 def _said(robot: Robot, corners: Array, least: float, units: Units) -> list[tuple[bool, str]]:
-    """What a motion from home has to do, whether it does, and what is said."""
-    off = float(np.linalg.norm(fk(robot, corners[-1])[:3, 3] - fk(robot, robot.q_home)[:3, 3]))
-    back, other = off <= NEAR * robot.reach, bool(apart(corners[-1], robot.q_home) > OTHER)
+    """What a motion from home has to do, whether it does, and what is said.
+
+    The tool is back only nearly, so the posture is that of the exact one to which the arm is nearest: near a
+    singularity, joints move the tool little.
+    """
+    end, home = corners[-1], robot.q_home
+    off = float(np.linalg.norm(fk(robot, end)[:3, 3] - fk(robot, home)[:3, 3]))
+    nearest = min(_postures(robot), key=lambda q: float(apart(q, end)), default=home)
+    back, other = off <= NEAR * robot.reach, bool(apart(nearest, home) > OTHER)
     bound = f": the smallest singular value stays above {general(least, 2)}" if math.isfinite(least) else ""
     clear = (
         f"No singularity is on the way{bound}." if least > 0.0 else "A singularity is on the way, or very near."
