@@ -140,19 +140,23 @@ def _promising(robot: Robot, motions: Array) -> Array:
     return motions[order[least[order] > 0.0]]
 
 
-def verified(robot: Robot, a: Array, b: Array) -> float:
+def verified(robot: Robot, a: Array, b: Array, most: float = math.inf) -> float:
     """A lower bound of the smallest singular value on the straight motion of the joints from a to b ``(n,)``.
 
     Args:
         robot: an arm with as many joints as its task has dimensions.
         a, b: configurations.
+        most: a motion that needs more samples is given up.
 
     Returns:
         The bound, lengths counting as shares of the arm's size; 0.0 if there may be a singularity.
     """
     steep = steepness(robot, a, b)
-    middle, half, least = np.array([0.5]), 0.5, math.inf
+    middle, half, least, samples = np.array([0.5]), 0.5, math.inf, 0
     while len(middle):
+        samples += len(middle)
+        if samples > most:
+            return 0.0
         sigma = smallest(robot, a + middle[:, None] * (b - a))
         done = sigma >= 2.0 * steep * half
         least = min(least, float((sigma[done] - steep * half).min(initial=math.inf)))

@@ -38,6 +38,8 @@ NEAR = 0.03  # of the reach: the tool is back, as near as sliders bring it with 
 OTHER = 0.2  # rad: exact postures differ by more
 AHEAD = math.cos(math.radians(10.0))  # a motion that turns by less has no corner
 MOST = 200  # corners
+LOOKS = 2000  # samples of one motion at most: then it is not verified
+FAR = 1e3  # rad: joints of an answer turn by less
 SAMPLES = 16  # places of the tool between two corners
 LEFT, TOP, SIDE = 46.0, 6.0, 220.0  # of the map, in drawing units
 SIZE = (LEFT + SIDE + 60.0, TOP + SIDE + 36.0)  # with its texts
@@ -70,7 +72,7 @@ def loop_of(robot: Robot) -> Array | None:
         return None
     home = robot.q_home
     for other in _postures(robot):
-        if apart(other, home) > OTHER and verified(robot, home, other) > 0.0:
+        if apart(other, home) > OTHER and verified(robot, home, other, LOOKS) > 0.0:
             points: Array = np.linspace(home, other, POINTS)
             points.flags.writeable = False
             return points
@@ -84,7 +86,7 @@ class Drive:
     Attributes:
         corners: ``(k, n)`` of the motion, the first one home, the last one where the arm is.
         least: no singular value was smaller on the way, with lengths as shares of the arm's size. 0.0: a
-            singularity was met, or passed too closely to tell. The drive is over then.
+            singularity was met, or it is not verified that there was none. The drive is over then.
     """
 
     corners: Array
@@ -98,12 +100,22 @@ def driven(robot: Robot, drive: Drive | None, q: Array) -> Drive | None:
     if drive is None or drive.least == 0.0 or apart(q, drive.corners[-1]) <= SAME:
         return drive
     *before, last = drive.corners
-    least = verified(robot, last, q)
-    if before and least > 0.0 and _is_ahead(before[-1], last, q) and verified(robot, before[-1], q) > 0.0:
+    least = verified(robot, last, q, LOOKS)
+    if before and least > 0.0 and _is_ahead(before[-1], last, q) and verified(robot, before[-1], q, LOOKS) > 0.0:
         corners = np.array([*before, q])
     else:
         corners = np.array([*before, last, q])
     return Drive(corners, min(drive.least, least)) if len(corners) <= MOST else None
+
+
+def _least(robot: Robot, corners: Array) -> float:
+    """A lower bound of the singular values on a motion with corners ``(k, n)``; 0.0 as of `verified`."""
+    least = math.inf
+    for a, b in pairwise(corners):
+        least = min(least, verified(robot, a, b, LOOKS))
+        if least == 0.0:
+            break
+    return least
 
 
 def _is_ahead(a: Array, b: Array, c: Array) -> bool:
@@ -130,9 +142,8 @@ def _said(robot: Robot, corners: Array, least: float, units: Units) -> list[tupl
     nearest = min(_postures(robot), key=lambda q: float(apart(q, end)), default=home)
     back, other = off <= NEAR * robot.reach, bool(apart(nearest, home) > OTHER)
     bound = f": the smallest singular value stays above {general(least, 2)}" if math.isfinite(least) else ""
-    clear = (
-        f"No singularity is on the way{bound}." if least > 0.0 else "A singularity is on the way, or very near."
-    )
+    unclear = "A singularity is on the way, or it is not verified that there is none."
+    clear = f"No singularity is on the way{bound}." if least > 0.0 else unclear
     if not back:
         return [
             (least > 0.0, clear),
@@ -174,7 +185,7 @@ class Round(Question):
         corners = self._corners(answer)
         if apart(corners[0], self.robot.q_home) > SAME:
             return Verdict(False, BEGIN)
-        least = min((verified(self.robot, a, b) for a, b in pairwise(corners)), default=math.inf)
+        least = _least(self.robot, corners)
         parts = _said(self.robot, corners, least, self.units)
         return Verdict.of(parts, " ".join(words for _, words in parts))
 
@@ -195,7 +206,10 @@ class Round(Question):
     def _corners(self, given: object) -> Array:
         if not isinstance(given, list) or not 0 < len(given) <= MOST:
             raise InputError("answer", given, f"1 to {MOST} configurations")
-        return np.array([numbers(each, self.robot.n, "one configuration in radians") for each in given])
+        corners = np.array([numbers(each, self.robot.n, "one configuration in radians") for each in given])
+        if np.abs(corners).max() > FAR:
+            raise InputError("answer", given, f"joints that turn by {FAR:g} rad at most")
+        return corners
 
 
 # What is shown
@@ -211,7 +225,8 @@ def drive_html(robot: Robot, drive: Drive | None, units: Units) -> str:
     if drive is None:
         return render("panel/note", text=BEGIN)
     if drive.least == 0.0:
-        return render("panel/note", text=f"✗ A singularity was met, or passed very closely. {BEGIN}")
+        met = "A singularity was met, or it is not verified that there was none."
+        return render("panel/note", text=f"✗ {met} {BEGIN}")
     said = _said(robot, drive.corners, drive.least, units)
     return render("panel/note", text=" ".join(f"{'✓' if fine else '○'} {words}" for fine, words in said))
 

@@ -14,6 +14,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.viewer.lessons.postures import questions
 from app.viewer.lessons.postures.loop import (
+    LOOKS,
     MOST,
     NEAR,
     SAME,
@@ -27,6 +28,7 @@ from app.viewer.lessons.postures.loop import (
     tool_path,
 )
 from kin.angles import apart
+from kin.postures import loops
 from kin.units import Units
 
 ARM = kin.get_robot("orthogonal3r")
@@ -169,7 +171,27 @@ def test_a_right_answer_is_back_in_another_posture() -> None:
     assert QUESTION.judge([HOME.tolist(), near.tolist()]).right
 
 
-NO_DRIVES = [None, [], [[1.0, 2.0]], [["1", 2, 3]], [[math.nan, 0, 0]], [[0.0] * 3] * (MOST + 1)]
+def test_an_answer_is_judged_with_a_bounded_number_of_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the singular set, and beside it, where every sample of a motion of the first joint alone is the same."""
+    looked, smallest = [], loops.smallest
+
+    def counted(robot: kin.Robot, q: np.ndarray) -> np.ndarray:
+        looked.append(len(q))
+        return smallest(robot, q)
+
+    monkeypatch.setattr(loops, "smallest", counted)
+    t2 = 0.9
+    singular = math.atan2(math.cos(t2), 1.0 + 2.0 * math.cos(t2))
+    for beside in (0.0, 0.01):
+        looked.clear()
+        turned = [[3.0 * (-1) ** i, t2, singular + beside] for i in range(MOST - 1)]
+        reason = QUESTION.judge([HOME.tolist(), *turned]).reason
+        assert reason == "A singularity is on the way, or it is not verified that there is none."
+        assert 0 < sum(looked) <= 2 * LOOKS
+    assert loops.verified(ARM, np.array([-3.0, t2, singular + 0.01]), np.array([3.0, t2, singular + 0.01])) > 0.0
+
+
+NO_DRIVES = [None, [], [[1.0, 2.0]], [["1", 2, 3]], [[math.nan, 0, 0]], [[0.0] * 3] * (MOST + 1), [[1.7e308] * 3]]
 
 
 @pytest.mark.parametrize("answer", NO_DRIVES)
