@@ -38,12 +38,13 @@ NEAR = 0.03  # of the reach: the tool is back, as near as sliders bring it with 
 OTHER = 0.2  # rad: exact postures differ by more
 AHEAD = math.cos(math.radians(10.0))  # a motion that turns by less has no corner
 MOST = 200  # corners
+SHORT = 0.005  # rad: a last corner nearer to the one before is replaced by the next
 LOOKS = 2000  # samples of one motion at most: then it is not verified
 FAR = 1e3  # rad: joints of an answer turn by less
 SAMPLES = 16  # places of the tool between two corners
 LEFT, TOP, SIDE = 46.0, 6.0, 220.0  # of the map, in drawing units
 SIZE = (LEFT + SIDE + 60.0, TOP + SIDE + 36.0)  # with its texts
-BEGIN = "The drive begins at home. Go back to the pose of this step."
+BEGIN = f"A drive begins at home and has at most {MOST} corners. Go back to the pose of this step."
 ABOUT = (
     "Section through axis 1 with the number of postures at each place. On orange curves two postures merge. The "
     "black line is where the tool has been, turned into the section; the dot is where it is."
@@ -101,7 +102,8 @@ def driven(robot: Robot, drive: Drive | None, q: Array) -> Drive | None:
         return drive
     *before, last = drive.corners
     least = verified(robot, last, q, LOOKS)
-    if before and least > 0.0 and _is_ahead(before[-1], last, q) and verified(robot, before[-1], q, LOOKS) > 0.0:
+    passed = len(before) > 0 and (apart(before[-1], last) < SHORT or _is_ahead(before[-1], last, q))
+    if passed and least > 0.0 and verified(robot, before[-1], q, LOOKS) > 0.0:
         corners = np.array([*before, q])
     else:
         corners = np.array([*before, last, q])

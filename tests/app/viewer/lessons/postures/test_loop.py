@@ -149,6 +149,15 @@ def test_a_drive_begins_at_home_and_is_kept_with_so_many_corners() -> None:
     assert found is not None
     far = found.corners[-1] - (found.corners[-1] - found.corners[-2])
     assert driven(ARM, found, far + 1e-3) is None
+    assert f"at most {MOST} corners" in drive_html(ARM, None, UNITS)
+
+
+def test_a_hand_that_trembles_makes_no_corners() -> None:
+    found, rng = driven(ARM, None, HOME), np.random.default_rng(2)
+    for _ in range(MOST + 20):
+        found = driven(ARM, found, HOME + rng.uniform(-0.002, 0.002, 3))
+    assert found is not None
+    assert len(found.corners) == 2
 
 
 def test_a_right_answer_is_back_in_another_posture() -> None:
