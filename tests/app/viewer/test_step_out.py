@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -62,7 +63,11 @@ def step_out(page: BarePage, q: np.ndarray) -> kin.escape.Exits:
     page.open(StepOut)
     press(page, "find")
     found = page.summaries.exits(page.now.robot, q, ()).future.result(60.0)  # type: ignore[attr-defined]
-    page.rest()
+    end = time.monotonic() + 60.0
+    while "are searched" in words(page):  # the page hears of the answer a moment after it is there
+        time.sleep(0.005)
+        page.rest()
+        assert time.monotonic() < end
     assert isinstance(found, kin.escape.Exits)
     return found
 
