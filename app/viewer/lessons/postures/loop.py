@@ -258,6 +258,8 @@ def _line(plot: Plot, path: Array) -> list[str]:
 def in_section(found: PostureMap, points: Array) -> Array:
     """Points ``(k, 3)``, turned about axis 1 into the section of a map, in its coordinates ``(k, 2)``."""
     plane, base = found.plane, found.robot.T_world_base
+    assert plane.u is not None
+    assert plane.v is not None
     axis, out = base[:3, 2], points - base[:3, 3]
     home = fk(found.robot, found.robot.q_home)[:3, 3] - base[:3, 3]
     aside = home - (home @ axis) * axis
