@@ -22,9 +22,16 @@ def pose(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 def frames(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
     """The frame after each row of the table."""
-    values, T, found = iter(np.asarray(q).tolist()), np.array(robot.base), []
+    given, T, found = np.asarray(q).tolist(), np.array(robot.base), []
+    joints = [row.name for row in robot.rows if row.kind != "fixed" and not row.follows]
+    followed, values = dict(zip(joints, given, strict=True)), iter(given)
     for row in robot.rows:
-        value = 0.0 if row.kind == "fixed" else next(values)
+        if row.kind == "fixed":
+            value = 0.0
+        elif row.follows:
+            value = row.ratio * followed[row.follows]
+        else:
+            value = next(values)
         theta = row.theta + (value if row.kind == "revolute" else 0.0)
         d = row.d + (value if row.kind == "prismatic" else 0.0)
         about_z, along_x = _turn(2, theta) @ _shift(2, d), _shift(0, row.a) @ _turn(0, row.alpha)

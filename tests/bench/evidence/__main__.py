@@ -9,7 +9,8 @@ The parameter of a redundancy is given, as it is in that configuration. Singular
 value of the Jacobian below 0.001, are left out: there postures merge. So are random tables whose joints move the
 tool in fewer directions than they are: they meet each pose in infinitely many ways.
 
-``--record`` writes the counts to ``tests/data/evidence.json`` and the table into ``docs/background/evidence.md``.
+``--record`` writes the counts to ``tests/data/evidence.json`` and the table into ``docs/background/evidence.md``;
+with ``--only``, for a new arm of a known kind, the other rows stay, and the file says which were counted later.
 ``--times`` measures instead how long answers take (`evidence.times`), and records them from an idle machine only.
 """
 
@@ -73,8 +74,8 @@ def main() -> int:
     parser.add_argument("--times", action="store_true", help="measure times, of one arm of each family")
     parser.add_argument("--record", action="store_true", help="write the file and the page")
     arguments = parser.parse_args()
-    if arguments.record and arguments.only:
-        parser.error("--record is for every kind of arm, without --only")
+    if arguments.times and arguments.record and arguments.only:
+        parser.error("--times --record is for every kind of arm, without --only")
     if arguments.times:
         return measure(arguments)
     asked = [each for each in questions(arguments.targets, arguments.seed) if (arguments.only or "") in each.kind]
@@ -100,7 +101,7 @@ def measure(arguments: argparse.Namespace) -> int:
 
 
 def record(rows: dict[str, dict[str, Any]], arguments: argparse.Namespace) -> None:
-    """Keep the run, and put its table into the page."""
+    """Keep the run, or the part of one in that of all, and put its table into the page."""
     about = {
         "version": kin.__version__,
         "date": datetime.date.today().isoformat(),
@@ -110,9 +111,13 @@ def record(rows: dict[str, dict[str, Any]], arguments: argparse.Namespace) -> No
         "targets": arguments.targets,
         "seed": arguments.seed,
     }
-    text = json.dumps({"run": about, "rows": rows}, indent=1, ensure_ascii=False)
-    RECORD.write_text(text + "\n", encoding="utf-8")
-    write_between(BEGIN, END, table(rows))
+    found = {"run": about, "rows": rows}
+    if arguments.only:
+        found = json.loads(RECORD.read_text(encoding="utf-8"))
+        found["run"].setdefault("later", []).append({**about, "rows": list(rows)})
+        found["rows"].update(rows)
+    RECORD.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_between(BEGIN, END, table(found["rows"]))
 
 
 def write_between(begin: str, end: str, text: str) -> None:
