@@ -5,7 +5,6 @@ Answers are plain data, as they come from a page or a program: see `Asked`.
 
 from __future__ import annotations
 
-import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ import numpy as np
 
 from app.exercises.cell import Declared
 from app.exercises.questions import Asked, Question, Verdict
+from app.exercises.typed import is_number
 from app.exercises.variant import Variant
 from kin import InputError, KinematicsError
 from kin.transforms import Array
@@ -171,11 +171,7 @@ def _rounded(text: str, unit: str, shown: str, digits: int) -> str:
 
 def numbers(given: object, count: int, what: str) -> Array:
     """Finite numbers ``(count,)``."""
-    if (
-        not isinstance(given, list | tuple)
-        or len(given) != count
-        or not all(type(value) in (int, float) and math.isfinite(value) for value in given)
-    ):
+    if not isinstance(given, list | tuple) or len(given) != count or not all(map(is_number, given)):
         raise InputError("answer", given, f"{count} numbers: {what}")
     return np.array([float(value) for value in given])
 

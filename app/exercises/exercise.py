@@ -17,6 +17,7 @@ from app.exercises.contract import Kind
 from app.exercises.expressions import Expression, ExpressionError, Function
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
+from app.exercises.typed import is_number
 from app.exercises.variant import Facts, Joined, Quantity, Variant
 from kin import Robot
 from kin.transforms import Array, pose_from_position_wxyz
@@ -51,7 +52,7 @@ def _read_bound(above: Callable[[Fields], float]) -> cell.Read:
 
 def _read_values(table: Fields, name: str) -> tuple[float, ...]:
     found = table.items(name)
-    if not all(type(value) in (int, float) and math.isfinite(value) for value in found):
+    if not all(map(is_number, found)):
         raise table.refuse(name, found, "numbers")
     return tuple(found)
 

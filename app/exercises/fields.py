@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from app.exercises.expressions import VALID, Expression, ExpressionError
+from app.exercises.typed import is_number
 from kin.errors import KinematicsError, shorten
 from kin.parsing import Limits, TextError, read_toml
 
@@ -192,7 +193,7 @@ class Fields:
         value = self.get(field)
         if value is None and default is not None:
             return default
-        if type(value) not in (int, float) or not math.isfinite(value) or not value > above:
+        if not is_number(value) or not value > above:
             raise self.refuse(field, value, "a number" + (f" above {above:g}" if above > -math.inf else ""))
         return float(value)
 

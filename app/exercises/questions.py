@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from app.exercises.mistakes import Models
-from app.exercises.typed import read_number, units_like
+from app.exercises.typed import is_number, read_number, units_like
 from app.exercises.variant import Variant
 from kin import InputError
 from kin.transforms import Array
@@ -260,7 +260,7 @@ class Number(Question):
         return read_number(text, self.unit)
 
     def is_answer(self, answer: object) -> bool:
-        return type(answer) in (int, float) and math.isfinite(answer)  # type: ignore[arg-type]
+        return is_number(answer)
 
     def judge(self, answer: float) -> Verdict:
         if self._near(answer, self.answer):

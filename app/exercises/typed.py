@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import sys
+from typing import TypeGuard
 
 from kin.typed import EntryError, ReadError, read, valid
 from kin.units import METRES, PLAIN, Unit
@@ -19,6 +21,11 @@ QUANTITIES: tuple[dict[str, float], ...] = (
     {"kg": 1.0, "g": 1e-3},
     {"J": 1.0, "kJ": 1e3},
 )
+
+
+def is_number(value: object) -> TypeGuard[int | float]:
+    """Whether it is a finite number; not an integer of more digits than floats have, which JSON may bring."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max  # type: ignore[arg-type]
 
 
 def read_number(text: str, unit: Unit) -> float:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import kin
 from app.exercises import Exercise, Variant, Verdict, parse_exercise
+from app.exercises.contract import numbers
 from app.exercises.exercise import VariantError
 from app.exercises.fields import ExerciseFileError
 from app.exercises.kinds import KINDS
@@ -591,3 +592,10 @@ def test_the_shown_program_is_right_as_it_stands() -> None:
 
 def test_every_kind_says_what_it_asks() -> None:
     assert all(kind.about.endswith(".") for kind in KINDS.values())
+
+
+@pytest.mark.parametrize("given", [10**400, -(10**400), math.inf, math.nan, True, "1"])
+def test_what_no_float_holds_is_no_answer(given):
+    assert not Number("How many?", 1.0, PLAIN, 0.1, "Count.").is_answer(given)
+    with pytest.raises(InputError):
+        numbers([0.0, given], 2, "two numbers")

@@ -229,6 +229,8 @@ def drive_html(robot: Robot, drive: Drive | None, units: Units) -> str:
     if drive.least == 0.0:
         met = "A singularity was met, or it is not verified that there was none."
         return render("panel/note", text=f"✗ {met} {BEGIN}")
+    if len(drive.corners) < 2:
+        return render("panel/note", text="The drive begins here: the arm is at home.")
     said = _said(robot, drive.corners, drive.least, units)
     return render("panel/note", text=" ".join(f"{'✓' if fine else '○'} {words}" for fine, words in said))
 

@@ -138,6 +138,9 @@ def test_a_drive_begins_at_home_and_is_kept_with_so_many_corners() -> None:
     q = HOME + 0.1
     assert driven(ARM, None, q) is None
     assert "begins at home" in drive_html(ARM, None, UNITS)
+    alone = driven(ARM, None, HOME)
+    assert alone is not None
+    assert "begins here" in drive_html(ARM, alone, UNITS), "nothing is said to be so before there is a drive"
     found, rng = driven(ARM, None, HOME), np.random.default_rng(1)
     assert found is not None
     assert driven(ARM, found, HOME.copy()) is not None
@@ -248,7 +251,7 @@ def test_the_arm_is_driven_round_in_the_page(port: int) -> None:
         tab.set("Lesson", "Postures")
         tab.wait(lambda: 'data-guide="steps"' in tab.html)
         press(tab, "go", value=at)
-        tab.wait(lambda: "The posture is that of home." in tab.html and "Postures of Orthogonal 3R:" in tab.html)
+        tab.wait(lambda: "The drive begins here" in tab.html and "Postures of Orthogonal 3R:" in tab.html)
         for point in "234":
             tab.set("Way point", point)
             tab.settle(0.1)
