@@ -259,6 +259,10 @@
     else openForm(pressed.dataset.type);
   });
 
+  addEventListener("input", (event) => {
+    if (event.target.matches?.("[data-typed] textarea")) showError(""); // readings of another text are none of this one
+  });
+
   addEventListener("change", (event) => {
     if (event.target.matches?.("[data-frame]")) {
       if (form() && !form().hidden) closeForm(); // its numbers are in the frame of before

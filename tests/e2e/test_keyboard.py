@@ -196,6 +196,7 @@ def test_a_target_is_typed_and_moved_by_keys(tab: Tab) -> None:
     expect(page.locator("[data-typed-error]")).to_contain_text("look like metres; the unit on screen is mm")
     expect(readings).to_have_text(["Lengths in m", "Lengths in mm"])
     text.fill("0.1 0.12 -0.15 m")
+    expect(readings).to_have_count(0)  # those of the text before
     text.press("Enter")
     readings.first.click()
     expect(text).to_be_hidden()
