@@ -137,7 +137,8 @@ def test_where_the_camera_stops_is_stored_and_restored(port: int) -> None:
             orbit(tab, np.array([ASIDE[0] * (1.0 + 0.02 * k), ASIDE[1], ASIDE[2]]))
             time.sleep(0.03)
         orbit(tab, ASIDE)
-        assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
+        tab.settle(quiet=0.8)
+        assert np.abs(decode(tab.kept[-1], STORE.robots).camera - ASIDE).max() < 1e-9
         seen = {m["type"] for m in tab.log[sent:]}
         of_bar = {"SceneNodeUpdateMessage", "SetPositionMessage"}
         assert seen == {"GuiUpdateMessage", *of_bar}
