@@ -1,25 +1,28 @@
 """A posture map as a picture (SVG, PNG) and as a table (CSV).
 
-`marks`, `axes` and `key` make the plot of the page, too: what is not coloured is drawn in the colour of the text.
+`page_chart` is the plot of the page: what is not coloured is drawn in the colour of the text.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from app.exports.picture import INK, MARGIN, SCALE, SOFT, STYLE
-from app.exports.svg import Axes, AxisStyle, Plot, png, png_url, text_of
+from app.exports.svg import PANEL, Axes, AxisStyle, Plot, chart, png, png_url, text_of
 from kin.postures import PostureMap
 from kin.units import DEFAULT_UNITS, Units, typeset
 
 SIZE = 620.0  # drawing units along the longer side
+_LEFT, _TOP, _SIDE = 46.0, 6.0, 220.0  # of the map in the page, in drawing units
+PAGE_SIZE = (_LEFT + _SIDE + 60.0, _TOP + _SIDE + 36.0)  # with its texts
 PIXELS = 1000  # about, along a side of the PNG
 SINGULAR = "#d55e00"
 
@@ -89,6 +92,18 @@ def key(found: PostureMap, left: float, top: float) -> list[str]:
             f'<text x="{left + 20.0:.0f}" y="{at + 11.5:.0f}" font-size="12" fill="currentColor">{number}</text>'
         )
     return parts
+
+
+def page_plot(found: PostureMap) -> Plot:
+    """Where the map is in `page_chart`."""
+    return Plot(_LEFT, _TOP, _SIDE, _SIDE, *found.plane.window)
+
+
+def page_chart(found: PostureMap, units: Units, label: str, over: Sequence[str] = ()) -> Markup:
+    """The map as a chart of the page, with what is drawn over it."""
+    plot = page_plot(found)
+    drawn = [*marks(found, plot), *key(found, plot.right + 8.0, plot.top), *over]
+    return chart((), drawn, (axes(found, plot, units, PANEL),), label, PAGE_SIZE)
 
 
 def as_svg(found: PostureMap) -> bytes:

@@ -17,8 +17,8 @@ import numpy as np
 
 from app.exercises.contract import numbers
 from app.exercises.questions import Asked, Question, Verdict
-from app.exports.postures import axes, key, marks
-from app.exports.svg import PANEL, Plot, chart
+from app.exports.postures import page_chart, page_plot
+from app.exports.svg import Plot
 from app.shared.summaries import PostureRequest
 from app.viewer.declared.scene import Node, lines
 from app.viewer.lessons.figure_shapes import PURPLE
@@ -42,8 +42,6 @@ SHORT = 0.005  # rad: a last corner nearer to the one before is replaced by the 
 LOOKS = 2000  # samples of one motion at most: then it is not verified
 FAR = 1e3  # rad: joints of an answer turn by less
 SAMPLES = 16  # places of the tool between two corners
-LEFT, TOP, SIDE = 46.0, 6.0, 220.0  # of the map, in drawing units
-SIZE = (LEFT + SIDE + 60.0, TOP + SIDE + 36.0)  # with its texts
 BEGIN = f"A drive begins at home and has at most {MOST} corners. Go back to the pose of this step."
 ABOUT = (
     "Section through axis 1 with the number of postures at each place. On orange curves two postures merge. The "
@@ -237,12 +235,11 @@ def drive_html(robot: Robot, drive: Drive | None, units: Units) -> str:
 
 def map_html(found: PostureMap, drive: Drive | None, units: Units) -> str:
     """The section with its singular curves and the way of the tool, and its regions in words."""
-    plot = Plot(LEFT, TOP, SIDE, SIDE, *found.plane.window)
-    drawn = [*marks(found, plot), *key(found, plot.right + 8.0, plot.top)]
+    way: list[str] = []
     if drive is not None:
-        drawn += _line(plot, in_section(found, tool_path(found.robot, drive.corners)))
+        way = _line(page_plot(found), in_section(found, tool_path(found.robot, drive.corners)))
     label = f"Postures of {found.robot.name}: their number at each place, in words below, and the way of the tool"
-    picture = chart((), drawn, (axes(found, plot, units, PANEL),), label, SIZE)
+    picture = page_chart(found, units, label, way)
     return render("velocity/line", chart=picture, words=f"{ABOUT} {typeset(found.explain(units))}")
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 import kin
-from app.exports.postures import axes, key, marks, pixels
-from app.exports.svg import PANEL, Plot, chart, cross
+from app.exports.postures import PAGE_SIZE, page_chart, page_plot, pixels
+from app.exports.svg import chart, cross
 from app.shared.summaries import PostureRequest
 from app.viewer.declared.scene import Color, Node, lines
 from app.viewer.drive import Drive
@@ -26,8 +26,6 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units, general, typeset
 
-LEFT, TOP, SIDE = 46.0, 6.0, 220.0  # of the map, in drawing units
-SIZE = (LEFT + SIDE + 60.0, TOP + SIDE + 36.0)  # with its texts
 COLOR: Color = (0, 158, 115)  # of the loop
 OPACITY = 0.35
 SHEER = 0.55  # opacity of a section in the scene
@@ -40,23 +38,15 @@ def note(text: str) -> str:
     return render("panel/note", text=text)
 
 
-def plot_of(found: PostureMap) -> Plot:
-    """Where the map is in its picture."""
-    return Plot(LEFT, TOP, SIDE, SIDE, *found.plane.window)
-
-
 def map_html(found: PostureMap, units: Units) -> str:
     """The map as a plot; ``static/lesson.js`` sends where it is clicked."""
-    plot = plot_of(found)
-    drawn = [*marks(found, plot), *key(found, plot.right + 8.0, plot.top)]
     label = f"Postures of {found.robot.name}: their number at each place, in words below"
-    picture = chart((), drawn, (axes(found, plot, units, PANEL),), label, SIZE)
-    return render("workspace/posture_map", chart=picture)
+    return render("workspace/posture_map", chart=page_chart(found, units, label))
 
 
 def mark_html(found: PostureMap, place: tuple[float, float]) -> str:
     """The place that was chosen, a layer over the map."""
-    picture = chart((), cross(plot_of(found).at(place)), (), "the place chosen", SIZE)
+    picture = chart((), cross(page_plot(found).at(place)), (), "the place chosen", PAGE_SIZE)
     return render("numeric/mark", chart=picture)
 
 
