@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kin.angles import TURN
-from kin.axes import NEARLY, screw_x, screw_z, size
+from kin.axes import NEARLY, size
 from kin.codegen import wrappers
 from kin.codegen.source import plain
 from kin.codegen.types import Constants
@@ -30,7 +30,7 @@ from kin.solvers.contract import POSE, BatchKernels, ClosedForm
 from kin.solvers.coupled import Coupled
 from kin.solvers.general5.closed_form import ANY_ORIENTATION, General5
 from kin.solvers.general6 import batch as general6_batch
-from kin.solvers.general6.closed_form import General6
+from kin.solvers.general6.closed_form import STEPS, General6
 from kin.solvers.general7.closed_form import General7
 from kin.solvers.offset7.answers import answer as answer_offset7
 from kin.solvers.offset7.closed_form import Offset7
@@ -45,6 +45,7 @@ from kin.solvers.planar4.branches import solve as solve_planar4
 from kin.solvers.planar4.closed_form import Planar4
 from kin.solvers.reversed import ReversedJoints, WrappedKernels
 from kin.solvers.rounded.closed_form import Rounded
+from kin.solvers.rounded.table import SHORT
 from kin.solvers.scaled import Scaled
 from kin.solvers.srs7.branches import solve as solve_srs7
 from kin.solvers.srs7.closed_form import Srs7
@@ -66,13 +67,6 @@ BOUNDS = {
 _ELSE = "Use kin.solve_ik, or the REST service"
 _RIGHT, _SEEN = 0.5 * math.pi, 1e-10
 _ANGLES = ("0", "pi/2 (90°)", "pi (180°)", "-pi/2 (-90°)")
-_TINY = 3e-4  # of the arm's size: such a length counts as rounding, as in kin.solvers.rounded
-
-# Poses close by, one below the other, as in kin.solvers.general6: radians, shares of the reach.
-_ASIDE = np.concatenate([
-    screw_z(1e-3 * a, 1e-3 * b) @ screw_x(1e-3 * c, 1e-3 * d)
-    for a, b, c, d in ((1.0, 0.6, -0.8, 0.9), (-0.7, 0.8, 1.1, -0.5), (0.3, -1.2, 0.9, 0.4))
-])  # fmt: skip
 
 
 class Alone(NamedTuple):
@@ -263,7 +257,7 @@ def _exact(robot: Robot) -> str:
                 found.append(f"{name} of {row.name} as {_ANGLES[quarters % 4]}")
         lengths = {"a": row.a, **({} if row.kind == "prismatic" else {"d": row.d})}
         found += [
-            f"{name} of {row.name} as 0" for name, x in lengths.items() if 0.0 < abs(x) < _TINY * size(robot)
+            f"{name} of {row.name} as 0" for name, x in lengths.items() if 0.0 < abs(x) < SHORT * size(robot)
         ]
     if not found:
         return "angles such as pi/2 and lengths with all their digits, or 0"
@@ -307,7 +301,7 @@ def _general6(form: General6, robot: Robot) -> Alone:
         turns=form.robot.revolute.astype(np.float64),
         size=size(form.robot),
         reach=extent(form.robot),
-        steps=_ASIDE,
+        steps=np.concatenate(STEPS),
     )
 
 

@@ -19,14 +19,14 @@ from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import POSE
 from kin.solvers.coupled import APART
 from kin.solvers.general6.batch import PROVED
+from kin.solvers.general6.closed_form import MET, SAME
 from kin.solvers.numeric import each_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Limits = tuple[Array, Array]  # lower and upper
 _AT_ZERO = TOLERANCES.near_miss
-# As in `kin.solvers.general6`: the error of a solution, how far apart two are; the pivot of a regular one.
-_MET, _SAME, _REGULAR = 1e-10, 1e-6, 1e-4
+_REGULAR = 1e-4  # pivot of the Jacobian of a regular solution
 
 
 def of_counted(
@@ -98,7 +98,7 @@ def of_general6(
         found = _counted(rows)
         each_of(other.model, (T, POSE, mask, 1.0), (low, high, turns), -1.0, found + 1, rows[:found], costs)
         for i in range(found):
-            if costs[i] < _MET and count < size:
+            if costs[i] < MET and count < size:
                 jacobian_one(other.model, rows[i], J)
                 for r in range(3):
                     for j in range(6):
@@ -126,7 +126,7 @@ def _is_new(row: Array, q: Array, count: int, turns: Array) -> bool:
         for j in range(row.shape[0]):
             off = row[j] - q[i, j]
             apart = max(apart, abs(wrap(off) if turns[j] != 0.0 else off))
-        if apart < _SAME:
+        if apart < SAME:
             return False
     return True
 

@@ -54,11 +54,11 @@ _PROBES = 9  # of these poses, those on which the degree is checked
 _CUTS = 3  # the most that are kept
 # Targets close by, in radians and shares of the reach; the error of a solution, how far apart two are, and the
 # smallest singular value of a double one.
-_STEPS = tuple(
+STEPS = tuple(
     screw_z(1e-3 * a, 1e-3 * b) @ screw_x(1e-3 * c, 1e-3 * d)
     for a, b, c, d in ((1.0, 0.6, -0.8, 0.9), (-0.7, 0.8, 1.1, -0.5), (0.3, -1.2, 0.9, 0.4))
 )
-_MET, _SAME = 1e-10, 1e-6
+MET, SAME = 1e-10, 1e-6
 _JOINTS = np.arange(6)
 _COPIES = 1e-3  # rad, m: farther apart are no copies of one solution, whatever its multiplicity
 SolveAll = Callable[[Array, Array, Array], int]
@@ -218,7 +218,7 @@ class General6(ClosedForm):
         if known == PROVED:
             return "proved"
         # Beside a singular wrist all cuts may miss the same two postures: a target close by has them apart.
-        if known == AGREED and not self._doubtful(q) and len(self._near_target(T, _STEPS[0])) == len(rows):
+        if known == AGREED and not self._doubtful(q) and len(self._near_target(T, STEPS[0])) == len(rows):
             return "agreed"
         return "agreed" if self._add_nearby(T, q) else "unknown"
 
@@ -235,7 +235,7 @@ class General6(ClosedForm):
         """
         # Of a curve the point nearest to the seed comes first.
         rows = self._thinned(T, np.concatenate([self._descended(T, near[None]), q[~np.isnan(q[:, 0])]]))
-        close = [self._near_target(T, step) for step in _STEPS]
+        close = [self._near_target(T, step) for step in STEPS]
         starts = np.random.default_rng(8).uniform(-math.pi, math.pi, (2, _STARTS, 6))
         starts[..., ~self.robot.revolute] *= extent(self.robot) / math.pi
         for each in (np.concatenate(close), *starts):
@@ -249,7 +249,7 @@ class General6(ClosedForm):
         """The configurations ``(k, 6)``, each once, and of those on one curve the first."""
         kept: list[int] = []
         for i, row in enumerate(rows):
-            if all(apart(rows[kept], row, self.robot.revolute) > _SAME) and len(kept) < _MOST_ROWS:
+            if all(apart(rows[kept], row, self.robot.revolute) > SAME) and len(kept) < _MOST_ROWS:
                 kept.append(i)
         rows = np.ascontiguousarray(rows[kept])
         return rows[curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))[1]]
@@ -272,7 +272,7 @@ class General6(ClosedForm):
         twin of a solution near a fold is looked for along the direction in which the arm barely moves.
         """
         count = found = int((~np.isnan(q[:, 0])).sum())
-        for step in _STEPS:
+        for step in STEPS:
             count = self._add(T, self._near_target(T, step), q, count)
         done = 0
         while done < count:
@@ -289,7 +289,7 @@ class General6(ClosedForm):
     def _add(self, T: Array, starts: Array, q: Array, count: int) -> int:
         """Add to the first `count` rows of q ``(16, 6)`` where descents from `starts` end; their number."""
         for row in self._descended(T, starts):
-            if count < SOLUTIONS and all(apart(q[:count], row, self.robot.revolute) > _SAME):
+            if count < SOLUTIONS and all(apart(q[:count], row, self.robot.revolute) > SAME):
                 q[count] = row
                 count += 1
         return count
@@ -304,5 +304,5 @@ class General6(ClosedForm):
     def _descended(self, T: Array, starts: Array) -> Array:
         """Where descents from `starts` ``(k, 6)`` meet the target."""
         rows, errors = descend_freely(self.robot.model, T, POSE, starts)
-        met = rows[errors < _MET]
+        met = rows[errors < MET]
         return np.asarray(np.where(self.robot.revolute, wrapped(met), met))

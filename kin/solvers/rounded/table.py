@@ -15,7 +15,7 @@ from kin.solvers.general5.completion import link_to
 from kin.solvers.reversed import table_of
 from kin.transforms import Array
 
-_LENGTH = 3e-4  # of the arm's size: a shorter offset beside exact ones was not meant
+SHORT = 3e-4  # of the arm's size: a shorter offset beside exact ones was not meant
 _CLOSE = 2e-2  # of the arm's size: the two arms put their tools at most so far apart
 _EXACT = 1e-10  # radians, shares of the arm's size: rounding that does not matter
 _SEEN = 2e-9  # the most that matching takes as exact
@@ -115,7 +115,7 @@ def _snapped(links: Links, scale: float) -> tuple[Links, Array]:
     alpha -= np.sign(alpha) * off
     changed = [off]
     for lengths in (a, d, tool[:3, 3]):
-        tiny = np.abs(lengths) < _LENGTH * scale
+        tiny = np.abs(lengths) < SHORT * scale
         changed.append(lengths[tiny] / scale)
         lengths[tiny] = 0.0
     x, y, z = tool[:3, 2].tolist()
