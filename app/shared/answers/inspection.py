@@ -6,6 +6,7 @@ Warnings forbid nothing: the arm works, but perhaps not as its author intended.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -151,6 +152,7 @@ def motions(robot: Robot) -> int:
     return int(np.linalg.matrix_rank(J, tol=1e-9))
 
 
+@lru_cache(maxsize=64)
 def home_margin(robot: Robot) -> float:
     """Margin of the home configuration (see `kin.files.home`), relative to the best of the candidates for one."""
     margin = margins(robot, np.vstack([robot.q_home, candidates(robot)[0]]))

@@ -16,7 +16,7 @@ import tomllib
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -52,11 +52,16 @@ class Detailed:
     visuals: tuple[Visual, ...]
 
 
-@lru_cache(maxsize=32)
 def detailed(robot: Robot) -> Detailed | None:
     """The detailed body of a built-in arm, if there is one and its package is installed."""
-    path = FOLDER / f"{robot.id}.toml"
-    if builtin_robots().get(robot.id) != robot or not path.is_file():
+    return body_of_builtin(robot.id) if builtin_robots().get(robot.id) == robot else None
+
+
+@cache  # each page that opens asks for all built-in arms
+def body_of_builtin(robot_id: str) -> Detailed | None:
+    """The detailed body of the built-in arm of this name, if there is one and its package is installed."""
+    robot, path = builtin_robots()[robot_id], FOLDER / f"{robot_id}.toml"
+    if not path.is_file():
         return None
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     try:

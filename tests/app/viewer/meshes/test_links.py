@@ -17,7 +17,7 @@ from zips import TWO_JOINTS, packed, robot_files
 import kin
 from app.viewer.meshes.archive import MeshError
 from app.viewer.meshes.bodies import KEPT, Bodies
-from app.viewer.meshes.library.library import Library, detailed
+from app.viewer.meshes.library.library import Library, body_of_builtin, detailed
 from app.viewer.meshes.links import carried_over, drawing_of, shapes_of
 from app.viewer.meshes.placing import PLAIN
 from app.viewer.meshes.reader import Meshes, MeshReader
@@ -322,11 +322,19 @@ def test_bodies_of_packages_have_room_of_their_own_and_say_why_they_cannot_be_re
     reader.close()
 
 
+def test_the_files_of_detailed_bodies_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    library, robots = Library(MeshReader()), tuple(kin.builtin_robots().values())
+    offered = library.offered(robots)
+    assert offered
+    monkeypatch.setattr(metadata, "distribution", None)
+    assert library.offered(robots) == offered
+
+
 def test_without_its_package_a_robot_has_no_detailed_body(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(name: str) -> metadata.Distribution:
         raise metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(metadata, "distribution", missing)
-    detailed.cache_clear()
+    body_of_builtin.cache_clear()
     assert Library(MeshReader()).offered((kin.get_robot("ur5"),)) == []
-    detailed.cache_clear()
+    body_of_builtin.cache_clear()
