@@ -36,17 +36,19 @@ class Shows(Protocol):
 
 
 _NUMBERS = itertools.count(1)
-_CHANNELS = weakref.WeakKeyDictionary[viser.GuiApi, Shows]()
+# The channel belongs to its page, which holds the key: a strong value would keep both for ever.
+_CHANNELS = weakref.WeakKeyDictionary[viser.GuiApi, weakref.ref[Shows]]()
 
 
 def bring_parts(gui: viser.GuiApi, channel: Shows) -> None:
-    """Have the HTML of this page come by a channel from now on."""
-    _CHANNELS[gui] = channel
+    """Have the HTML of this page come by a channel from now on; the caller keeps the channel."""
+    _CHANNELS[gui] = weakref.ref(channel)
 
 
 def add_html(gui: viser.GuiApi, content: str = "", order: float | None = None) -> Block:
     """Add a block of HTML to the container that is open."""
-    channel = _CHANNELS.get(gui)
+    known = _CHANNELS.get(gui)
+    channel = None if known is None else known()
     if channel is None:
         return gui.add_html(content, order=order)
     key = f"part-{next(_NUMBERS)}"
