@@ -10,7 +10,7 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
-from app.viewer.lessons.postures.survey import survey
+from app.viewer.postures.survey import survey
 from app.viewer.skeleton import places
 
 pytestmark = pytest.mark.browser

@@ -11,7 +11,7 @@ from app.viewer.lessons.postures.directions import Cone
 from app.viewer.lessons.postures.loop import loop_of
 from app.viewer.lessons.postures.remedies import Remedy
 from app.viewer.lessons.postures.settings import PosturesSettings, names_of
-from app.viewer.lessons.postures.survey import CLOSEST, Posture, survey
+from app.viewer.postures.survey import CLOSEST, Posture, survey
 from kin import IKResult
 
 

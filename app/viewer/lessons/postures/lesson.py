@@ -29,14 +29,14 @@ from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.postures import loop, remedies
 from app.viewer.lessons.postures.directions import Cone, cone_html, has_cone
 from app.viewer.lessons.postures.facts import PosturesFacts
-from app.viewer.lessons.postures.ghosts import ghosts
 from app.viewer.lessons.postures.planar import is_planar
 from app.viewer.lessons.postures.questions import outline
 from app.viewer.lessons.postures.remedies import Remedy, Request
 from app.viewer.lessons.postures.settings import PosturesSettings
-from app.viewer.lessons.postures.survey import html
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
+from app.viewer.postures.ghosts import ghosts
+from app.viewer.postures.survey import html
 from app.viewer.views.templates import render
 from kin import IKResult, Robot
 from kin.transforms import Array

@@ -79,8 +79,8 @@ def loop_of(robot: Robot) -> Array | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
-    """What the arm was driven since it was at home.
+class DrivenPath:
+    """The motion on which the arm was driven since it was at home.
 
     Attributes:
         corners: ``(k, n)`` of the motion, the first one home, the last one where the arm is.
@@ -92,10 +92,10 @@ class Drive:
     least: float = math.inf
 
 
-def driven(robot: Robot, drive: Drive | None, q: Array) -> Drive | None:
+def driven(robot: Robot, drive: DrivenPath | None, q: Array) -> DrivenPath | None:
     """A drive that goes on to q ``(n,)``; None before the arm is at home, and with too many corners."""
     if apart(q, robot.q_home) <= SAME:
-        return Drive(robot.q_home[None])
+        return DrivenPath(robot.q_home[None])
     if drive is None or drive.least == 0.0 or apart(q, drive.corners[-1]) <= SAME:
         return drive
     *before, last = drive.corners
@@ -105,7 +105,7 @@ def driven(robot: Robot, drive: Drive | None, q: Array) -> Drive | None:
         corners = np.array([*before, q])
     else:
         corners = np.array([*before, last, q])
-    return Drive(corners, min(drive.least, least)) if len(corners) <= MOST else None
+    return DrivenPath(corners, min(drive.least, least)) if len(corners) <= MOST else None
 
 
 def _least(robot: Robot, corners: Array) -> float:
@@ -220,7 +220,7 @@ def request(robot: Robot) -> PostureRequest:
     return PostureRequest(robot, JointConstraints(), False, None, None, None, None)
 
 
-def drive_html(robot: Robot, drive: Drive | None, units: Units) -> str:
+def drive_html(robot: Robot, drive: DrivenPath | None, units: Units) -> str:
     """What the drive has done so far."""
     if drive is None:
         return render("panel/note", text=BEGIN)
@@ -233,7 +233,7 @@ def drive_html(robot: Robot, drive: Drive | None, units: Units) -> str:
     return render("panel/note", text=" ".join(f"{'✓' if fine else '○'} {words}" for fine, words in said))
 
 
-def map_html(found: PostureMap, drive: Drive | None, units: Units) -> str:
+def map_html(found: PostureMap, drive: DrivenPath | None, units: Units) -> str:
     """The section with its singular curves and the way of the tool, and its regions in words."""
     way: list[str] = []
     if drive is not None:
@@ -268,7 +268,7 @@ def in_section(found: PostureMap, points: Array) -> Array:
     return np.asarray(turned @ np.column_stack([plane.u, plane.v]))
 
 
-def path_nodes(robot: Robot, drive: Drive) -> list[Node]:
+def path_nodes(robot: Robot, drive: DrivenPath) -> list[Node]:
     """The way of the tool in the scene."""
     points = tool_path(robot, drive.corners)
     return [lines("drive", np.stack([points[:-1], points[1:]], axis=1), PURPLE, 3.0)]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import kin
 from app.viewer.declared.fields import Settings, flag, kept, memory, subset
-from app.viewer.lessons.postures.loop import Drive
-from app.viewer.lessons.postures.survey import CLOSEST
+from app.viewer.lessons.postures.loop import DrivenPath
+from app.viewer.postures.survey import CLOSEST
 from kin import IKResult, Robot
 
 ALL_GHOSTS_HINT = "Shows all postures as translucent copies of the arm; grey ones are outside the limits"
@@ -39,4 +39,4 @@ class PosturesSettings(Settings):
     hidden: frozenset[str] = kept(frozenset(), to_json=sorted, from_json=_read_hidden, renew=True)
     result: IKResult | None = memory()
     round: bool = memory(False, renew=False)
-    drive: Drive | None = memory()
+    drive: DrivenPath | None = memory()

@@ -19,7 +19,7 @@ from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import NODES, PostureRequest, Summaries
-from app.viewer.lessons.postures.survey import Posture
+from app.viewer.postures.survey import Posture
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import KEY, KEY_REPLACE, decode
 from app.viewer.tabs.workspace.postures import views

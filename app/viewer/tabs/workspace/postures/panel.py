@@ -20,10 +20,10 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Sweep, Work
 from app.viewer.drive import FRAME, Drive, locked
-from app.viewer.lessons.postures import survey
-from app.viewer.lessons.postures.ghosts import ghosts
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
+from app.viewer.postures import survey
+from app.viewer.postures.ghosts import ghosts
 from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.postures import views
 from app.viewer.tabs.workspace.postures.settings import PostureSettings

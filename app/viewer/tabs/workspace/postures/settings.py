@@ -8,7 +8,7 @@ from typing import Literal
 from app.shared.summaries import PostureRequest
 from app.viewer.declared.fields import Settings, choice, flag, memory
 from app.viewer.drive import Drive
-from app.viewer.lessons.postures.survey import Posture
+from app.viewer.postures.survey import Posture
 from kin import JointConstraints
 
 Plane = Literal["vertical", "horizontal", "joints"]

@@ -13,8 +13,8 @@ from app.exports.svg import chart, cross
 from app.shared.summaries import PostureRequest
 from app.viewer.declared.scene import Color, Node, lines
 from app.viewer.drive import Drive
-from app.viewer.lessons.postures.survey import Posture, best_manipulability, limit_margin
 from app.viewer.panel.status import Notice
+from app.viewer.postures.survey import Posture, best_manipulability, limit_margin
 from app.viewer.skeleton import ghost
 from app.viewer.tabs.workspace.pick import MARK_COLOUR
 from app.viewer.views.templates import render

@@ -18,7 +18,7 @@ from app.viewer.lessons.postures.loop import (
     MOST,
     NEAR,
     SAME,
-    Drive,
+    DrivenPath,
     Round,
     drive_html,
     driven,
@@ -55,7 +55,7 @@ def fine(corners: np.ndarray, count: int = 300) -> np.ndarray:
     return np.concatenate([a + s * (b - a) for a, b in pairwise(corners)])
 
 
-def drive(corners: np.ndarray) -> Drive | None:
+def drive(corners: np.ndarray) -> DrivenPath | None:
     """As frames of the page show the motion."""
     found = None
     for q in fine(corners, 25):
@@ -123,7 +123,7 @@ def test_a_singularity_between_two_samples_is_met() -> None:
     corners = along((-51, -170, 32))
     values = np.array([det(q) for q in fine(corners)])
     assert np.sign(values[0]) == np.sign(values[-1]) != np.sign(values.min() if values[0] > 0 else values.max())
-    met = driven(ARM, Drive(HOME[None]), corners[-1])
+    met = driven(ARM, DrivenPath(HOME[None]), corners[-1])
     assert met is not None
     assert met.least == 0.0
     assert driven(ARM, met, points()[-1]) is met, "the drive is over"
@@ -220,7 +220,7 @@ def test_the_line_on_the_map_is_the_way_of_the_tool() -> None:
     expected = np.column_stack([np.hypot(places[:, 0], places[:, 1]), places[:, 2]])
     assert np.allclose(np.abs(path), np.abs(expected), atol=1e-9)
     assert np.allclose(path[0], path[-1], atol=1e-9), "the loop is closed"
-    shown = map_html(found, Drive(points()[[0, -1]]), UNITS)
+    shown = map_html(found, DrivenPath(points()[[0, -1]]), UNITS)
     assert shown.count("<circle") == map_html(found, None, UNITS).count("<circle") + 1
 
 

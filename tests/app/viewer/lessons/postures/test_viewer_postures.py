@@ -16,9 +16,9 @@ from app.shared.store import Store
 from app.viewer.lessons.postures import remedies
 from app.viewer.lessons.postures.directions import has_cone, patch, reachable, share, sphere
 from app.viewer.lessons.postures.remedies import Remedy, Request
-from app.viewer.lessons.postures.survey import Posture, html, limit_margin, survey
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import short
+from app.viewer.postures.survey import Posture, html, limit_margin, survey
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.skeleton import places, skeleton
 from kin.units import DEFAULT_UNITS, Units

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from app.viewer.declared.scene import Node, frame, label
-from app.viewer.lessons.postures.survey import Posture, color_of
+from app.viewer.postures.survey import Posture, color_of
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import placed, places
 from kin import Robot
