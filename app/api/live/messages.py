@@ -20,11 +20,11 @@ from app.api.program import DescribedBy, ProgramBody
 from app.api.schemas import Body, Configuration, Vector3, Vector4, integral
 from app.api.workspace.query import validated
 from app.live import VALUES
-from app.shared.problems import FieldError, from_input_error, show
+from app.shared.problems import FieldError, show
 from app.shared.store import Store
 from kin import InputError, Robot, UnknownRobotError
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
-from kin.motion import program_from_dict
+from kin.motion import Program, program_from_dict
 from kin.motors import q_from_readings
 from kin.motors.joints import moving_motors, of_moving
 from kin.poses import check_length
@@ -193,7 +193,7 @@ def id_of(text: str) -> int | None:
 
 
 def read(text: str, robot: Robot, store: Store) -> Message:
-    """Read a message for a page that shows this robot; raises `ProblemError` naming the field."""
+    """Read a message for a page that shows this robot; raises `ProblemError` or `InputError` naming the field."""
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
         size = len(text.encode("utf-8", "replace"))
         error = FieldError(field="message", value=f"{size} bytes", expected=f"at most {MOST_BYTES} bytes")
@@ -212,16 +212,10 @@ def read(text: str, robot: Robot, store: Store) -> Message:
     if body.robot is not None:
         values["robot"] = sent = _robot(body.robot, store)
         robot = sent if isinstance(sent, Robot) else body.robot.robot()  # type: ignore[union-attr]
-    try:
-        if body.obstacles is not None:
-            values["obstacles"] = checked_obstacles(
-                [each.model_dump(exclude_none=True) for each in body.obstacles]
-            )
-        if body.program is not None:
-            values["program"] = program_from_dict(body.program, robot)
-    except InputError as error:
-        prefix = "" if error.field.startswith(("obstacles", "program")) else "program."
-        raise invalid(from_input_error(error, prefix)) from None
+    if body.obstacles is not None:
+        values["obstacles"] = checked_obstacles([each.model_dump(exclude_none=True) for each in body.obstacles])
+    if body.program is not None:
+        values["program"] = _program(body.program, robot)
     if body.q is not None:
         values["q"] = configuration(robot, body.q, "q", within=True)
     if body.target is not None:
@@ -242,18 +236,23 @@ def read(text: str, robot: Robot, store: Store) -> Message:
     return Message(body.id, body.subscribe, values)
 
 
+def _program(given: dict[str, Any], robot: Robot) -> Program:
+    """A program; raises `InputError`."""
+    try:
+        return program_from_dict(given, robot)
+    except InputError as error:
+        raise error.within("program") from None
+
+
 def _read_motors(robot: Robot, readings: list[float] | None) -> dict[str, Any]:
-    """The readings and, where each joint has a motor, the configuration that they mean; raises 422."""
+    """The readings and, where each joint has a motor, the configuration that they mean; raises `InputError`."""
     if readings is None:
         return {"readings": None, "measured": None}
     try:
         motors = moving_motors(robot)
     except InputError as error:
-        raise invalid(FieldError(field="readings", value=show(readings), expected=error.expected)) from None
-    try:
-        read = of_moving(robot.motors, readings)
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
+        raise InputError("readings", readings, error.expected) from None
+    read = of_moving(robot.motors, readings)
     driven = {motor.joint for motor in motors}
     known = all(joint.name in driven for joint in robot.joints)
     return {"readings": read.tolist(), **({"measured": q_from_readings(robot, read)} if known else {})}

@@ -21,7 +21,7 @@ from starlette.websockets import WebSocketDisconnect
 from app.api.body import LARGE, versioned
 from app.api.live.answers import news, welcome
 from app.api.live.messages import MOST_BYTES, USUAL_RATE, Message, id_of, read
-from app.api.problems import ProblemError, internal_error, invalid
+from app.api.problems import ProblemError, as_problem, internal_error, invalid
 from app.api.websockets import DONE, FAILED, POLICY, accept, close
 from app.classroom.tokens import read_code, show_code
 from app.live import RESERVED, BusyLineError, Line, Lines, Program
@@ -197,11 +197,11 @@ class Conversation:
         async with self._reading:  # so that a long one is not overtaken by the next
             try:
                 message = await self._message(text)
-            except ProblemError as error:
-                self._say(id_of(text), error.problem)
-            except Exception:
-                logger.exception("a message of a program failed")
-                self._say(id_of(text), internal_error().problem)
+            except Exception as error:
+                known = error if isinstance(error, ProblemError) else as_problem(error)
+                if known is None:
+                    logger.exception("a message of a program failed")
+                self._say(id_of(text), (known or internal_error()).problem)
             else:
                 self._line.note("sent", text)
                 if message.subscription is not None:
