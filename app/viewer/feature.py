@@ -25,7 +25,7 @@ from app.viewer.arm import Arm
 from app.viewer.frames import Frames
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.meshes.reader import ClientMeshes
-from app.viewer.own_arm import OwnArm
+from app.viewer.own_arm import OwnArm, clean
 from app.viewer.panel.fence import Fence
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
@@ -34,6 +34,8 @@ from kin.collision import Contact
 from kin.ik import Task
 from kin.transforms import Array
 from kin.units import Units
+
+SAVED = "Your browser has put it where it puts downloads."
 
 
 class Stage(Protocol):
@@ -290,6 +292,22 @@ class Feature:
 
     def remove(self) -> None:
         """Remove everything from scene and panel."""
+
+
+def save_file(stage: Stage, name: str, data: bytes | str, words: str = SAVED) -> None:
+    """Have the browser of a page save a file, and say so."""
+    stage.client.send_file_download(name, data.encode() if isinstance(data, str) else data, save_immediately=True)
+    stage.notify(Notice("hand", f"{name} is saved", words))
+
+
+def sent_text(value: object, most: int) -> tuple[str, str]:
+    """Name and text of a file that the page sends, of at most so many bytes; raises `kin.InputError`."""
+    match value:
+        case [str(name), str(text)] if len(text.encode(errors="replace")) <= most:
+            return clean(name, 60), text
+        case [str(name), _]:
+            raise InputError("file", clean(name, 60), f"a file of at most {most // 1000} kB")
+    raise InputError("upload", value, "the name and the text of a file")
 
 
 def message_of(features: Iterable[Feature], message: object) -> tuple[str, Hashable, object]:

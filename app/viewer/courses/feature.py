@@ -15,7 +15,7 @@ from app.classroom.results.codes import clean_alias
 from app.viewer.activity.activity import EXERCISES, REVIEW
 from app.viewer.courses import views
 from app.viewer.courses.views import CourseView
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Feature, Stage, save_file, sent_text
 from app.viewer.lessons import LESSONS
 from app.viewer.panel import update_html
 from app.viewer.panel.part import Block, add_html
@@ -134,10 +134,9 @@ class CourseFeature(Feature):
                 self._view = CourseView()
                 progress.course = progress.at = None
                 self.stage.activity.enter_course()
-            case "upload", [str(file), str(text)]:
-                if not text or len(text) > MOST_IN_FILE:
-                    raise InputError("file", file, f"a text file of 1 to {MOST_IN_FILE} bytes")
-                self._open(parse_course(text, self._courses.exercises, file[:80], self._courses.find))
+            case "upload", _:
+                file, text = sent_text(value, MOST_IN_FILE)
+                self._open(parse_course(text, self._courses.exercises, file, self._courses.find))
             case "edit" | "done", _:
                 view.editing, view.link, view.code = name == "edit", "", ""
             case "go", int():
@@ -249,12 +248,7 @@ class CourseFeature(Feature):
         if course is None:
             return
         stem = re.sub(r"[^a-z0-9]+", "-", course.title.lower()).strip("-") or "course"
-        self.stage.client.send_file_download(
-            f"{stem}.toml", to_toml(to_data(course)).encode(), save_immediately=True
-        )
-        self.stage.notify(
-            Notice("hand", f"{stem}.toml is saved", "Your browser has put it where it puts downloads.")
-        )
+        save_file(self.stage, f"{stem}.toml", to_toml(to_data(course)))
 
     def _link(self) -> str:
         course = self._progress.course

@@ -28,7 +28,7 @@ from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Node, axes, frame, label
 from app.viewer.exercises import author_views as views
 from app.viewer.exercises.drawing import SIZE
-from app.viewer.feature import Stage
+from app.viewer.feature import Stage, save_file, sent_text
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 from kin.parsing import to_toml
@@ -199,8 +199,8 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         match name, rest, value:
             case "set", ["new", int()], str(origin) if not data:
                 self._start(origin)
-            case "upload", _, [str(file), str(text)]:
-                self._upload(file[:80], text)
+            case "upload", _, _:
+                self._upload(*sent_text(value, MOST_BYTES))
             case "close", _, _:
                 self.change(draft="")
             case "set", [str(path), int()], str(text) if data:
@@ -250,8 +250,6 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         self._open(data)
 
     def _upload(self, file: str, text: str) -> None:
-        if not text or len(text.encode(errors="replace")) > MOST_BYTES:
-            raise InputError("file", file, f"a text file of 1 to {MOST_BYTES} bytes")
         parse_exercise(text, file, self.stage.store.get)
         self._open(forms.read(text))
 
@@ -310,9 +308,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         self.stage.notify(Notice("hand", f"In the course {course.title}", detail))
 
     def _save(self, exercise: Exercise) -> None:
-        name = f"{exercise.id}.toml"
-        self.stage.client.send_file_download(name, self.settings.draft.encode(), save_immediately=True)
-        self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
+        save_file(self.stage, f"{exercise.id}.toml", self.settings.draft)
 
     def _serve(self, exercise: Exercise) -> None:
         """Into the folder of the service, for all pages."""

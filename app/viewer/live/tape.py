@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.live import Line
 from app.live.recording import Bounds, Recording, Track, to_csv, to_mcap
 from app.live.recording.recording import SHOWN
-from app.viewer.feature import Stage
+from app.viewer.feature import Stage, save_file
 from app.viewer.panel.status import Notice
 from kin import InputError
 from kin.transforms import Array
@@ -87,8 +87,7 @@ class Tape:
         except InputError as error:
             stage.notify(Notice("error", "The recording was not saved", f"This format is for {error.expected}."))
             return
-        stage.client.send_file_download(file, data, save_immediately=True)
-        stage.notify(Notice("hand", f"{file} is saved", "Radians, metres and seconds."))
+        save_file(stage, file, data, "Radians, metres and seconds.")
 
     # Playing
 

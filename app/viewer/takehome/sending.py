@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.exports.snippets import named
-from app.viewer.feature import Stage
+from app.viewer.feature import Stage, save_file
 from app.viewer.panel.status import Notice
 from app.viewer.takehome.page import SavedArm, web_page
 from kin.motion import Motion
@@ -22,7 +22,5 @@ def send_page(stage: Stage, motion: Motion | None = None) -> None:
     page = web_page(
         SavedArm(robot, arm.goal, drawn, arm.aim, arm.options, motion, stage.units, stage.link, arm.obstacles)
     )
-    file = f"{robot.id}.html"
-    stage.client.send_file_download(file, page.encode(), save_immediately=True)
     words = "It needs no server: open it from a disk, send it, or put it into a learning platform."
-    stage.notify(Notice("hand", f"{file} is saved", words))
+    save_file(stage, f"{robot.id}.html", page, words)

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import kin
 from app.exports.snippets import named
 from app.shared.answers.inspection import inspect
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Feature, Stage, save_file
 from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MOST_BYTES, MeshError
 from app.viewer.meshes.incoming import IncomingFile, not_sent
@@ -37,7 +37,6 @@ from kin.typed import LONGEST, cut
 PARTS = ("start", "table", "wrong", "about", "motion", "wrong-motion", "frames", "wrong-frames", "convert")
 OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
 UNUSED = "The file was not used"
-SAVED = "Your browser has put it where it puts downloads."
 
 
 class RobotTab(Feature):
@@ -399,8 +398,7 @@ class RobotTab(Feature):
             return
         robot = self.stage.now.robot if self._own is None else named(self.stage.now.robot)
         name, text = text_of(robot, kind)
-        self.stage.client.send_file_download(name, text.encode(), save_immediately=True)
-        self.stage.notify(Notice("hand", f"{name} is saved", SAVED))
+        save_file(self.stage, name, text)
 
     def _upload(self, value: object) -> None:
         if isinstance(value, IncomingFile):
@@ -423,9 +421,7 @@ class RobotTab(Feature):
             doctor.close()
             self._show_files()
         elif action == "save":
-            name, text = doctor.file_name, doctor.mended.text
-            self.stage.client.send_file_download(name, text.encode(), save_immediately=True)
-            self.stage.notify(Notice("hand", f"{name} is saved", SAVED))
+            save_file(self.stage, doctor.file_name, doctor.mended.text)
         elif action == "open":
             self._open(self._uploads.open_mended)
         else:

@@ -18,6 +18,7 @@ from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, No
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.scene import bars, label
 from app.viewer.declared.work import Sweep, Work
+from app.viewer.feature import save_file
 from app.viewer.lessons.figure_shapes import BLUE, PURPLE, VERMILION
 from app.viewer.own_arm import own_arm
 from app.viewer.panel.status import Notice
@@ -283,10 +284,8 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     def on_print(self) -> None:
         """Save the sheet."""
         paper = self.settings.paper
-        file = f"touch-sheet-{paper}.svg"
-        self.stage.client.send_file_download(file, sheet_svg(paper).encode(), save_immediately=True)
         words = f"Print it on {paper} at 100 %, and measure the line on it."
-        self.stage.notify(Notice("hand", f"{file} is saved", words))
+        save_file(self.stage, f"touch-sheet-{paper}.svg", sheet_svg(paper), words)
 
     def on_take(self) -> None:
         """Take what is typed; raises `InputError`: it cannot be read, and stays."""
@@ -322,9 +321,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         """Save what was found as one page."""
         if (found := self.facts.ready) is not None:
             page = report(found.calibration, [each.socket for each in found.touches])
-            self.stage.client.send_file_download("calibration.html", page.encode(), save_immediately=True)
-            words = "Every touch, and every error of the table."
-            self.stage.notify(Notice("hand", "calibration.html is saved", words))
+            save_file(self.stage, "calibration.html", page, "Every touch, and every error of the table.")
 
     def on_use(self) -> None:
         """Make the arm that was found that of the page; raises `KinematicsError`: it is too long for a link."""

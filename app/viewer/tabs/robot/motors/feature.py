@@ -13,7 +13,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings, choice, memory, number, text
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.work import Sweep
-from app.viewer.own_arm import clean
+from app.viewer.feature import save_file, sent_text
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits
 from app.viewer.tabs.robot.edits import EditError
@@ -175,14 +175,10 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
     def _open(self, value: object) -> None:
         """Use a file with LeRobot's calibration that the page sends."""
         try:
-            match value:
-                case [str(file), str(text)] if len(text.encode(errors="replace")) <= LARGEST:
-                    motors = kin.motors.motors_from_lerobot(self.stage.now.robot, text)
-                    self._use(motors, f"The calibration {clean(file, 60)} is used")
-                case [str(file), _]:
-                    raise InputError("file", clean(file, 60), f"a file of at most {LARGEST // 1000} kB")
-                case _:
-                    raise InputError("upload", value, "the name and the text of a file")
+            name, text = sent_text(value, LARGEST)
+            self._use(
+                kin.motors.motors_from_lerobot(self.stage.now.robot, text), f"The calibration {name} is used"
+            )
         except InputError as error:
             self.stage.notify(Notice("error", "The file was not used", str(error)))
 
@@ -257,8 +253,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
     def on_save(self) -> None:
         """Save LeRobot's calibration."""
         data = json.dumps(kin.motors.motors_to_lerobot(self.stage.now.robot), indent=4)
-        self.stage.client.send_file_download("calibration.json", data.encode(), save_immediately=True)
-        self.stage.notify(Notice("hand", "calibration.json is saved", SAVED))
+        save_file(self.stage, "calibration.json", data, SAVED)
 
     def _show_pose(self, run: Run) -> None:
         """Move the arm to the pose of the run; what was read in it before is in the field."""
