@@ -121,6 +121,21 @@ def s_curve(start: float, end: float, velocity: float, acceleration: float, jerk
     return Profile(motion.breaks[0], np.pad(motion.pieces[0], ((0, 0), (0, 2))))
 
 
+def fastest(way: float, limits: Array) -> dict[str, Profile]:
+    """The fastest of each kind from rest to rest over a way, within limits ``(3,)``.
+
+    The jerk of cubic and trapezoidal profiles is not limited: it is infinite at their ends.
+    """
+    v, a, j = limits.tolist()
+    root = math.sqrt(10.0 * way / (math.sqrt(3.0) * a))
+    return {
+        "cubic": cubic(0.0, way, max(1.5 * way / v, math.sqrt(6.0 * way / a))),
+        "quintic": quintic(0.0, way, max(1.875 * way / v, root, math.cbrt(60.0 * way / j))),
+        "trapezoidal": trapezoidal(0.0, way, v, a),
+        "S-curve": s_curve(0.0, way, v, a, j),
+    }
+
+
 def _finite(**values: float) -> list[float]:
     return [finite_number(name, value, "a finite number") for name, value in values.items()]
 

@@ -82,15 +82,7 @@ def joint_ends(robot: Robot) -> tuple[Array, Array]:
 def family(robot: Robot) -> dict[str, Profile]:
     """The fastest profile of each kind within the limits of the example's joint."""
     _, _, way, limits = example(robot)
-    v, a, j = limits.tolist()
-    return {
-        "cubic": profiles.cubic(0.0, way, max(1.5 * way / v, (6.0 * way / a) ** 0.5)),
-        "quintic": profiles.quintic(
-            0.0, way, max(1.875 * way / v, (10.0 / 3.0**0.5 * way / a) ** 0.5, (60.0 * way / j) ** (1.0 / 3.0))
-        ),
-        "trapezoidal": profiles.trapezoidal(0.0, way, v, a),
-        "S-curve": profiles.s_curve(0.0, way, v, a, j),
-    }
+    return profiles.fastest(way, limits)
 
 
 def sampled(profile: Profile, scale: float) -> tuple[Array, tuple[Array, ...]]:

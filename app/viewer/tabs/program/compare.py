@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
 import kin
-from app.viewer import profiles
-from app.viewer.profiles import Profile
+from app.viewer.profiles import Profile, fastest
 from app.viewer.tabs.program.plan import Plan, looped, start
 from app.viewer.tabs.program.program import as_kind
 from kin.motion import Dwell, Motion, Program, Ptp
@@ -83,8 +80,8 @@ def other_motion(program: Program, plan: Plan, loop: bool, choice: Choice, zone:
     return motion if choice not in _PROFILES or not motion.planned else with_profile(motion, _PROFILES[choice])
 
 
-def with_profile(motion: Motion, profile: Callable[[Array], Profile]) -> Motion:
-    """The motion with another profile of each PTP from rest to rest; `profile` takes limits ``(3,)``."""
+def with_profile(motion: Motion, kind: str) -> Motion:
+    """The motion with another profile of each PTP from rest to rest, of a kind of `fastest`."""
     pieces: list[Piece] = list(motion.pieces)
     for times, segment in zip(motion.segments, motion.program.segments, strict=True):
         k = int(np.argmin(np.abs(motion.starts[:-1] - times.start))) if pieces else 0
@@ -100,7 +97,8 @@ def with_profile(motion: Motion, profile: Callable[[Array], Profile]) -> Motion:
             way = np.abs(end - start)
             limits = np.array([motion.limits.velocity, motion.limits.acceleration, motion.limits.jerk])
             moving = way > 1e-12
-            pieces[k] = Straight(start, end, profile((limits[:, moving] / way[moving]).min(axis=1) * scales))
+            shared = (limits[:, moving] / way[moving]).min(axis=1) * scales
+            pieces[k] = Straight(start, end, fastest(1.0, shared)[kind])
     starts = np.concatenate([[0.0], np.cumsum([piece.duration for piece in pieces])])
 
     def new(time: float) -> float:
@@ -110,24 +108,11 @@ def with_profile(motion: Motion, profile: Callable[[Array], Profile]) -> Motion:
     return replace(motion, pieces=tuple(pieces), segments=segments)
 
 
-def _polynomial(kind: Callable[[float, float, float], Profile]) -> Callable[[Array], Profile]:
-    """The fastest of a family that is stretched in time: its peaks fall with the time, its square and its cube."""
-
-    def made(limits: Array) -> Profile:
-        peaks = np.abs(kind(0.0, 1.0, 1.0).sample(np.linspace(0.0, 1.0, 1001))[1:]).max(axis=1)
-        duration = max(
-            (peak / limit) ** (1.0 / k) for k, (peak, limit) in enumerate(zip(peaks, limits, strict=True), 1)
-        )
-        return kind(0.0, 1.0, math.nextafter(duration, math.inf))
-
-    return made
-
-
-_PROFILES: dict[Choice, Callable[[Array], Profile]] = {
-    "cubic": _polynomial(profiles.cubic),
-    "quintic": _polynomial(profiles.quintic),
-    "trapezoidal": lambda limits: profiles.trapezoidal(0.0, 1.0, *limits[:2].tolist()),
-    "s_curve": lambda limits: profiles.s_curve(0.0, 1.0, *limits.tolist()),
+_PROFILES: dict[Choice, str] = {
+    "cubic": "cubic",
+    "quintic": "quintic",
+    "trapezoidal": "trapezoidal",
+    "s_curve": "S-curve",
 }
 _ABOUT: dict[Choice, str] = {
     "cubic": "Velocity is continuous, acceleration jumps at both ends: its jerk there is infinite.",
