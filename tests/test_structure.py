@@ -329,7 +329,6 @@ FIELDS = {
     "CourseFeature": 2,
     "Guide": 7,
     "Member": 6,
-    "ObstaclesFeature": 5,
     "Practising": 11,
     "RobotTab": 6,
     "Workspace": 2,

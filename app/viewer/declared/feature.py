@@ -251,9 +251,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
                     getattr(self, name)(*arguments)
             case ("done", ()):
                 self._go_on(time.perf_counter())
-            case ("drag", (str(name), *arguments)):
-                assert isinstance(value, tuple)
-                getattr(self, name)(*arguments, *value[:1], value[1:])
+            case ("drag", (str(name), *arguments), int()):
+                getattr(self, name)(*arguments, value)
             case _:
                 self.heard(key, value)
 

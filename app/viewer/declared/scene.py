@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike
 
 from app.viewer.declared.panel import same
 from app.viewer.labels import add_label
+from app.viewer.scene import gizmo
+from app.viewer.scene.gizmo import DragEvent
 from app.viewer.scene.shapes import Solid
 from app.viewer.viser_patches import assign, keep_private
 from kin.transforms import Array, wxyz_from_rotation
@@ -25,7 +27,7 @@ Color = tuple[int, int, int]
 Vector = Array | Sequence[float]
 Post = Callable[[Hashable, object], None]
 COLORS = frozenset({"colors", "batched_colors"})  # properties
-_ROOTS = count(1)
+_ROOTS, _DRAGS = count(1), count(1)
 
 
 @dataclass(slots=True, eq=False)
@@ -33,7 +35,7 @@ class Node:
     """A node of the scene: viser's `add_…` of this kind with these properties, below its parent.
 
     Attributes:
-        drag: the event of a handle that is dragged; the method also gets the phase and the position ``(3,)``.
+        drag: the event of a handle that is dragged; the method also gets each `DragEvent`.
         click: the event of a click.
         keep: whether it is only hidden when it is not shown.
         once: whether its key is never used again once it is gone, so that nobody needs to remember its name.
@@ -139,6 +141,7 @@ class _Shown:
     keep: bool
     visible: bool = True
     held: bool = False
+    drag: int = 0
     args: tuple[Any, ...] | None = None  # of a `Lazy`, which has no handle
     children: dict[str, _Shown] = field(default_factory=dict)
 
@@ -235,14 +238,17 @@ class SceneView:
         if not one.held:
             assign(one.handle, node.position, node.wxyz)
 
-    def _listen(self, gizmo: Any, one: _Shown, event: tuple[Hashable, ...]) -> None:
-        keep_private(gizmo)
+    def _listen(self, handle: viser.TransformControlsHandle, one: _Shown, event: tuple[Hashable, ...]) -> None:
+        keep_private(handle)
 
-        @gizmo.on_update  # type: ignore[untyped-decorator]
-        async def _(found: viser.TransformControlsEvent) -> None:
-            if found.client is not None:
-                one.held = found.phase != "end"
-                self._post(("drag", event), (found.phase, *found.target.position.tolist()))
+        def post(key: Hashable, pull: object) -> None:
+            assert isinstance(pull, DragEvent)
+            one.held = pull.phase != "end"
+            if pull.phase == "start":
+                one.drag = next(_DRAGS)  # each is a step of its own in the history
+            self._post(("drag", event, one.drag), pull)
+
+        gizmo.listen(handle, ring=False, post=post)
 
     def _listen_click(self, node: Any, event: tuple[Hashable, ...]) -> None:
         @node.on_click  # type: ignore[untyped-decorator]

@@ -14,13 +14,14 @@ from app.exercises import Asked, Exercise, Variant, VariantError, Verdict
 from app.viewer.activity.activity import EXERCISES
 from app.viewer.activity.practice import Practice, Record
 from app.viewer.exercises import views
-from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
+from app.viewer.exercises.drawing import SIZE, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
+from app.viewer.scene.gizmo import DragEvent
 from kin import InputError
 from kin.transforms import Array, pose_from_position_wxyz
 from kin.typed import EntryError
@@ -97,10 +98,9 @@ class Practising(Feature):
     def handle(self, key: Hashable, value: object) -> None:
         if not self.shown:
             return  # a late click on what has been removed
-        if key == GHOST:
-            self._drag(value)
-            return
         match key:
+            case ("drag", _, int()) if isinstance(value, DragEvent):
+                self._sheet.drag(pose_from_position_wxyz(value.position, value.wxyz), self.stage.units)
             case ("list", int()):
                 self._practice.close()
                 self._undraw()
@@ -244,13 +244,6 @@ class Practising(Feature):
     def _asked(self) -> Asked:
         assert self._variant is not None
         return self._now.asked(self._variant, self.stage.units)
-
-    def _drag(self, value: object) -> None:
-        """The ghost was dragged."""
-        match value:
-            case (list(position), list(wxyz)):
-                self._sheet.drag(pose_from_position_wxyz(position, np.array(wxyz)), self.stage.units)
-                self._update()
 
     def _answer(self, how: str, value: object, sending: str = "") -> None:
         """Judge an answer; `sending` as in `Judged`."""

@@ -1,72 +1,137 @@
 """Obstacles in the panel and the scene: added, chosen, dragged, typed, removed.
 
-The obstacles themselves belong to the page: `Stage.obstacles` and `Stage.use_obstacles`. What is pressed and typed
+The obstacles themselves belong to the page: `Arm.obstacles` and `Stage.use_obstacles`. What is pressed and typed
 is sent by ``static/lesson.js``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
-
-from app.viewer.feature import Feature, Stage
-from app.viewer.obstacles import placed
-from app.viewer.obstacles.nodes import ObstacleNodes
-from app.viewer.obstacles.placed import PLACE, TURN
-from app.viewer.panel import update_html
-from app.viewer.panel.entry import read_cell
-from app.viewer.panel.part import add_html
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import Settings, memory
+from app.viewer.declared.panel import Html
+from app.viewer.declared.scene import Lazy, Node
+from app.viewer.obstacles import nodes, placed
+from app.viewer.obstacles.placed import Obstacles
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
 from app.viewer.scene.gizmo import DragEvent, travel
 from app.viewer.scene.meshes import body
-from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
-from kin import InputError, Obstacle
 from kin.collision import Contact
 from kin.collision.obstacles import KINDS, MOST_OBSTACLES
-from kin.collision.solids import SPHERE
-from kin.transforms import pose_from_position_wxyz
-from kin.typed import ReadError, cut
+from kin.transforms import Array, pose_from_position_wxyz
+from kin.typed import EntryError
+from kin.units import Units
 
 _ORDER = sorted(KINDS, key=lambda shape: not KINDS[shape].topped)  # what others stand on comes first
 
 
-class ObstaclesFeature(Feature):
+class Refused(NamedTuple):
+    """What was typed into a field and is not used."""
+
+    field: str
+    text: str
+    why: str
+
+
+@dataclass(frozen=True)
+class ObstacleSettings(Settings):
+    """What is done with the obstacles.
+
+    Attributes:
+        chosen: the one whose fields are open.
+        refused: what was typed last, if it is not used.
+        touched: those that the arm touches.
+        grabbed: pose ``(4, 4)`` of the chosen one when it was grabbed; None: it is not held.
+    """
+
+    chosen: int | None = memory(renew=False)
+    refused: Refused | None = memory(renew=False)
+    touched: frozenset[int] = memory(frozenset(), renew=False)
+    grabbed: Array | None = memory()
+
+
+class ObstacleFacts(Facts[ObstacleSettings]):
+    """The obstacles of the page."""
+
+    @property
+    def items(self) -> Obstacles:
+        """All."""
+        return self.arm.obstacles
+
+    @property
+    def chosen(self) -> int | None:
+        """The one whose fields are open; a program or undo may have taken it away."""
+        found = self.settings.chosen
+        return found if found is not None and found < len(self.items) else None
+
+
+class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
     """The obstacles of one page."""
 
     key = "obstacles"
     title = "Obstacles"
+    settings_of, facts_of = ObstacleSettings, ObstacleFacts
     messages = frozenset({"add", "choose", "set", "remove", "close"})
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
-        self._chosen: int | None = None
-        self._wrong: tuple[str, str, str] | None = None  # field, what was typed, and what is wrong with it
-        self._touched: frozenset[int] = frozenset()
-        self._held = False
-        self._start = np.eye(4)  # pose of the chosen one when it was grabbed
-        self._nodes = ObstacleNodes(stage.client.scene, self.post)
-        self._html = add_html(stage.client.gui)
-        self._show()
+    # Declared
 
-    def handle(self, key: Hashable, value: object) -> None:
+    def panel(self) -> Sequence[Html]:
+        f, s = self.read, self.settings
+        return [Html(panel_html, (f.items, f.chosen, s.touched, s.refused, self.stage.units))]
+
+    def scene(self) -> Sequence[Node | Lazy]:
+        f, s = self.facts, self.settings
+        radius, chosen = body(f.robot).radius, f.chosen
+        found: list[Node | Lazy] = []
+        for i, each in enumerate(f.items):
+            red = i in s.touched
+            args = i, each, radius, red, red or i == chosen, self.event(self.on_click, i)
+            found.append(Lazy(str(i), nodes.nodes, args))
+        if chosen is not None:
+            T = placed.pose(f.items[chosen])
+            found.append(nodes.gizmo(T, radius, self.event(self.on_drag)))
+            if s.grabbed is not None:
+                found.append(nodes.travel(travel(s.grabbed, T, self.stage.units), T, radius))
+        return found
+
+    def on_contacts(self, contacts: Sequence[Contact]) -> None:
+        touched = frozenset(each.obstacle for each in contacts if each.obstacle is not None)
+        if touched != self.settings.touched:
+            self.change(touched=touched)
+            self.refresh()
+
+    def extents(self) -> Sequence[Sphere]:
+        return [(each.T[:3, 3], float(each.row[16])) for each in self.stage.now.obstacles]
+
+    # Events
+
+    def heard(self, key: Hashable, value: object) -> None:
+        items, chosen = self.facts.items, self.facts.chosen
         match key, value:
             case (("add", str(shape), int()), _):
                 self._add(shape)
-            case ((("choose", int()) | "choose"), int(index)):
-                self._choose(index)
+            case (("choose", int()), int(index)) if 0 <= index < len(items):
+                self.on_click(index)
             case (("close", int()), _):
-                self._choose(None)
+                self._open(None)
+            case ((("remove" | "set"), *_), _) if chosen is None:
+                pass  # a late click
             case (("remove", int()), _):
-                self._remove()
+                assert chosen is not None
+                self._open(None)
+                self.stage.notify(Notice("hand", f"Removed: {items[chosen].label}", "Undo brings it back."))
+                self._use(placed.removed(items, chosen))
             case (("set", str(field), int()), str(text)):
-                self._type(field, text)
-            case ("grab" | "gizmo", DragEvent()):
-                self._pull(value)
+                assert chosen is not None
+                self._type(chosen, field, text)
             case _:
-                raise InputError("obstacles", key, "the key of a button or a field, with its value")
+                super().heard(key, value)
 
     def step_name(self, key: Hashable) -> str:
         match key:
@@ -74,161 +139,76 @@ class ObstaclesFeature(Feature):
                 return f"Add a {shape}"
             case ("remove", *_):
                 return "Remove an obstacle"
-            case "grab" | "gizmo":
+            case ("drag", *_):
                 return "Drag of an obstacle"
         return "Change of an obstacle"
 
-    # Reports of the session
+    def on_click(self, index: int) -> None:
+        """Open the fields of one, or close them."""
+        self._open(None if index == self.facts.chosen else index)
 
-    def on_obstacles(self) -> None:
-        if self._chosen is not None and self._chosen >= len(self.stage.now.obstacles):
-            self._chosen, self._held = None, False
-        self._show()
+    def on_drag(self, pull: DragEvent) -> None:
+        """One event of the gizmo. Obstacles do not avoid the arm: it may avoid them. What touches is red."""
+        items, index = self.facts.items, self.facts.chosen
+        if index is None:
+            return
+        start = placed.pose(items[index]) if self.settings.grabbed is None else self.settings.grabbed
+        self.change(grabbed=None if pull.phase == "end" else start)
+        if pull.phase != "start":
+            self.change(refused=None)
+            self._use(placed.moved(items, index, pose_from_position_wxyz(pull.position, pull.wxyz)))
 
-    def on_contacts(self, contacts: Sequence[Contact]) -> None:
-        touched = frozenset(each.obstacle for each in contacts if each.obstacle is not None)
-        if touched != self._touched:
-            self._touched = touched
-            self._show_panel()
-            self._nodes.mark(self._touched, self._chosen)
-
-    def on_robot(self) -> None:
-        self._show()
-
-    def on_style(self) -> None:
-        self._show_panel()
-
-    def extents(self) -> Sequence[Sphere]:
-        return [(each.T[:3, 3], float(each.row[16])) for each in self.stage.now.obstacles]
-
-    def remove(self) -> None:
-        self._nodes.remove()
-
-    # Changes
+    def _open(self, index: int | None) -> None:
+        self.change(chosen=index, refused=None, grabbed=None)
 
     def _add(self, shape: str) -> None:
-        arm = self.stage.now
-        stage = self.stage
+        arm, stage = self.stage.now, self.stage
         if len(arm.obstacles) >= MOST_OBSTACLES:
             detail = f"A page has at most {MOST_OBSTACLES}. Remove one first."
             stage.notify(Notice("error", "No obstacle was added", detail))
             return
         items = placed.added(arm.obstacles, shape, arm.robot, arm.goal)
-        self._choose(len(items) - 1, False)
+        self._open(len(items) - 1)
         detail = "Drag its arrows, or type its place and size in the tab Move."
         stage.notify(Notice("hand", f"Added: {items[-1].label}", detail))
         self._use(items)
 
-    def _choose(self, index: int | None, show: bool = True) -> None:
-        if index is not None and not 0 <= index < len(self.stage.now.obstacles) + (not show):
-            raise InputError("obstacle", index, f"0 to {len(self.stage.now.obstacles) - 1}")
-        self._chosen = None if index == self._chosen and show else index
-        self._wrong, self._held = None, False
-        if show:
-            self._show()
-
-    def _remove(self) -> None:
-        index = self._chosen
-        if index is None:
-            return
-        gone = self.stage.now.obstacles[index].label
-        self._choose(None, False)
-        self.stage.notify(Notice("hand", f"Removed: {gone}", "Undo brings it back."))
-        self._use(placed.removed(self.stage.now.obstacles, index))
-
-    def _pull(self, pull: DragEvent) -> None:
-        """One event of the gizmo. Obstacles do not avoid the arm: it may avoid them. What touches is red."""
-        if self._chosen is None:
-            return
-        self._held = pull.phase != "end"
-        if pull.phase == "start":
-            self._start = placed.pose(self.stage.now.obstacles[self._chosen])
-        else:
-            T = pose_from_position_wxyz(pull.position, pull.wxyz)
-            self._wrong = None
-            self._use(placed.moved(self.stage.now.obstacles, self._chosen, T))
-        if self._held:
-            T = placed.pose(self.stage.now.obstacles[self._chosen])
-            radius = body(self.stage.now.robot).radius
-            self._nodes.travel.show(travel(self._start, T, self.stage.units), T[:3, 3], radius)
-        else:
-            self._show()
-
-    def _type(self, field: str, text: str) -> None:
-        if self._chosen is None:
-            return
+    def _type(self, index: int, field: str, text: str) -> None:
         try:
-            value = read_cell(text, self.stage.units.of(field in TURN))
-            items = placed.changed(self.stage.now.obstacles, self._chosen, field, value)
-        except ReadError as error:
-            self._refuse(field, text, str(error))
-        except InputError as error:
-            if error.field == "field":
-                raise
-            self._refuse(field, text, f"“{cut(text)}” is not valid; valid: {error.expected}")
+            items = placed.typed(self.facts.items, index, field, text, self.stage.units)
+        except EntryError as error:
+            refused = Refused(field, text[:60], f"{field.capitalize()}: {error.detail}")
+            self.change(refused=refused)
+            self.stage.notify(Notice("error", "The obstacle stays as it was", refused.why))
         else:
-            self._wrong = None
+            self.change(refused=None)
             self._use(items)
-            self._show()
 
-    def _use(self, items: tuple[Obstacle, ...]) -> None:
+    def _use(self, items: Obstacles) -> None:
         """Take what the visitor has made of the obstacles; an arm that avoids them is solved again."""
         before = self.stage.now.obstacles
         self.stage.use_obstacles(items)
         if self.stage.now.avoid and items != before:
             self.stage.solve_again()
 
-    def _refuse(self, field: str, text: str, why: str) -> None:
-        self._wrong = field, text[:60], f"{field.capitalize()}: {why}."
-        self.stage.notify(Notice("error", "The obstacle stays as it was", self._wrong[2]))
-        self._show_panel()
 
-    # Drawing
-
-    def _show(self) -> None:
-        items, radius = self.stage.now.obstacles, body(self.stage.now.robot).radius
-        self._nodes.show(items, radius)
-        self._nodes.mark(self._touched, self._chosen)
-        if not self._held:
-            self._nodes.travel.hide()
-            T = None if self._chosen is None else placed.pose(items[self._chosen])
-            self._nodes.place_gizmo(T, radius)
-        self._show_panel()
-
-    def _show_panel(self) -> None:
-        items, chosen = self.stage.now.obstacles, self._chosen
-        rows = [{"name": each.label, "touched": i in self._touched} for i, each in enumerate(items)]
-        update_html(
-            self._html,
-            render(
-                "obstacles/panel",
-                shapes=_ORDER,
-                rows=rows,
-                chosen=chosen,
-                groups=self._groups(),
-                name="" if chosen is None else items[chosen].label,
-                full=len(items) >= MOST_OBSTACLES,
-                most=MOST_OBSTACLES,
-                wrong="" if self._wrong is None else self._wrong[2],
-            ),
-        )
-
-    def _groups(self) -> list[tuple[str, list[dict[str, object]]]]:
-        """The fields of the one that is chosen, by groups."""
-        if self._chosen is None:
-            return []
-        each = self.stage.now.obstacles[self._chosen]
-        place = "Middle of the top" if each.kind.topped else "Centre"
-        found = [(place, PLACE, each.xyz, False), ("Size", each.kind.names, each.sizes, False)]
-        if each.kind.solid != SPHERE:
-            found.insert(1, ("Rotation", TURN, each.rpy, True))
-        return [
-            (title, [self._field(*pair, angle) for pair in zip(names, values, strict=True)])
-            for title, names, values, angle in found
-        ]
-
-    def _field(self, key: str, value: float, angle: bool) -> dict[str, object]:
-        unit = self.stage.units.of(angle)
-        wrong = self._wrong is not None and self._wrong[0] == key
-        shown = self._wrong[1] if wrong and self._wrong is not None else text_of(value, unit)
-        return {"key": key, "value": shown, "unit": unit.name, "wrong": wrong}
+def panel_html(
+    items: Obstacles, chosen: int | None, touched: frozenset[int], refused: Refused | None, units: Units
+) -> str:
+    """Buttons to add one, all obstacles, and the fields of the chosen one."""
+    wrong = {} if refused is None else {refused.field: refused.text}
+    groups = []
+    for title, fields in [] if chosen is None else placed.fields_of(items[chosen]):
+        cells = [one.cell(name, value, units, wrong.get(name)) for name, (one, value) in fields.items()]
+        groups.append((title, cells[0]["unit"], [cell | {"unit": ""} for cell in cells]))
+    return render(
+        "obstacles/panel",
+        shapes=_ORDER,
+        rows=[{"name": each.label, "touched": i in touched} for i, each in enumerate(items)],
+        chosen=chosen,
+        groups=groups,
+        name="" if chosen is None else items[chosen].label,
+        full=len(items) >= MOST_OBSTACLES,
+        most=MOST_OBSTACLES,
+        wrong="" if refused is None else refused.why,
+    )

@@ -14,15 +14,18 @@ import numpy as np
 
 import kin
 from app.viewer.own_arm import clean
+from app.viewer.panel.entry import NumberField
 from app.viewer.scene.meshes import body
 from kin import InputError, Obstacle, Robot
 from kin.collision.obstacles import KINDS, LARGEST, MOST_OBSTACLES, SMALLEST, Shape
+from kin.collision.solids import SPHERE
 from kin.poses import roll_pitch_yaw
 from kin.transforms import Array
+from kin.units import Units
 
 Obstacles = tuple[Obstacle, ...]
 NAME = 24  # characters
-FARTHEST = 1000.0  # m from the origin, as for targets
+FARTHEST, MOST_TURN = 1000.0, 200.0 * math.pi  # m from the origin, as for targets; rad
 PLACE, TURN = ("x", "y", "z"), ("roll", "pitch", "yaw")
 _SHAPES = {kind.letter: shape for shape, kind in KINDS.items()}
 _DIGITS = 6  # of metres and radians in a link
@@ -148,25 +151,38 @@ def removed(items: Obstacles, index: int) -> Obstacles:
     return (*items[:index], *items[index + 1 :])
 
 
-def changed(items: Obstacles, index: int, field: str, value: float) -> Obstacles:
-    """With another value (m, rad) of x, y, z, roll, pitch, yaw or one of its sizes.
+def fields_of(each: Obstacle) -> list[tuple[str, dict[str, tuple[NumberField, float]]]]:
+    """The numbers of an obstacle, by groups, as its kind has them: how each is typed, and its value (m, rad)."""
+    place = "Middle of the top" if each.kind.topped else "Centre"
+    found = [(place, PLACE, each.xyz, (-FARTHEST, FARTHEST), "length")]
+    if each.kind.solid != SPHERE:
+        found.append(("Rotation", TURN, each.rpy, (-MOST_TURN, MOST_TURN), "angle"))
+    found.append(("Size", each.kind.names, each.sizes, (SMALLEST, LARGEST), "length"))
+    return [
+        (title, {name: (NumberField(name, *ends, unit), value) for name, value in zip(names, values, strict=True)})
+        for title, names, values, ends, unit in found
+    ]
+
+
+def typed(items: Obstacles, index: int, field: str, text: str, units: Units) -> Obstacles:
+    """With what was typed into a field of one.
 
     Raises:
-        InputError: naming the field, the value and what is valid.
+        EntryError: with what would be valid.
+        InputError: it has no such field.
     """
     each = items[index]
+    known = {name: one for _, group in fields_of(each) for name, (one, _) in group.items()}
+    if field not in known:
+        raise InputError("field", field, "one of " + ", ".join(known))
+    value = known[field].read(text, units)
+    assert value is not None
     if field in PLACE:
-        if not abs(value) <= FARTHEST:
-            raise InputError(field, f"{value:g} m", f"at most {FARTHEST:g} m from the origin")
         new = replace(each, xyz=_with(each.xyz, PLACE.index(field), value))
     elif field in TURN:
         new = replace(each, rpy=_with(each.rpy, TURN.index(field), value))
-    elif field in (names := each.kind.names):
-        if not SMALLEST <= value <= LARGEST:
-            raise InputError(field, f"{value:g} m", f"{1000 * SMALLEST:g} mm to {LARGEST:g} m")
-        new = replace(each, **each.kind.with_sizes(_with(each.sizes, names.index(field), value)))
     else:
-        raise InputError("field", field, "one of " + ", ".join((*PLACE, *TURN, *names)))
+        new = replace(each, **each.kind.with_sizes(_with(each.sizes, each.kind.names.index(field), value)))
     return (*items[:index], new, *items[index + 1 :])
 
 

@@ -13,7 +13,7 @@ from kin.transforms import Array
 Anchor = Literal["bottom-center", "top-center"]
 # Height of the text above the point, relative to the radius of the sphere around the arm; or below it, clear of
 # the arrows of a gizmo there.
-_ABOVE, _BELOW = 0.16, 0.3
+_ABOVE, BELOW = 0.16, 0.3
 
 
 def place_beside(point: Array, size: float, target: Array | None, radius: float) -> tuple[float, Anchor]:
@@ -39,7 +39,7 @@ class KeyNumber:
     """A short text above or below a point. Not thread-safe: the visitor's worker calls it."""
 
     def __init__(self, scene: viser.SceneApi, name: str = "/key-number", below: bool = False) -> None:
-        self._height = -_BELOW if below else _ABOVE
+        self._height = -BELOW if below else _ABOVE
         anchor: Anchor = "top-center" if below else "bottom-center"
         self._label = add_label(scene, name, "", anchor=anchor, visible=False)
 

@@ -104,12 +104,12 @@ def pause_within(gesture: tuple[object, ...], value: object) -> float:
 
     Drags and typing in a feature are one step each; a choice or a button is always one of its own. Typing into a
     cell ends when the visitor leaves the cell, which the page reports. A drag of a gizmo goes on, however long it
-    rests, until something is grabbed again.
+    rests; the next one is another control.
     """
     if gesture[0] != "feature":
         return RULES[str(gesture[0])].gradual
     key = gesture[2]
-    if key == "gizmo":
+    if isinstance(key, tuple) and key[:1] == ("drag",):
         return math.inf
     if isinstance(key, tuple) and key and key[0] == "cell":
         return LONG_PAUSE if key[-1] != "kind" else 0.0

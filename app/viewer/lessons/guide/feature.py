@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from app.viewer.declared.scene import Node, SceneView, ends
-from app.viewer.exercises.drawing import GHOST, Drawing
+from app.viewer.exercises.drawing import Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.exercises.views import Following
 from app.viewer.feature import Feature, Stage
@@ -28,6 +28,7 @@ from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
+from app.viewer.scene.gizmo import DragEvent
 from kin import InputError, Robot
 from kin.transforms import Array, pose_from_position_wxyz
 from kin.typed import EntryError
@@ -148,8 +149,8 @@ class Guide(Feature):
                 self._earlier.pop(progress, None)
                 progress.ask_also({})
                 self._begin_again()
-            case _ if key == GHOST and isinstance(value, list | tuple) and len(value) == 2:
-                T = pose_from_position_wxyz(value[0], np.array(value[1]))
+            case ("drag", _, int()) if isinstance(value, DragEvent):
+                T = pose_from_position_wxyz(value.position, value.wxyz)
                 self._sheet(str(progress.at + 1)).drag(T, self.stage.units)
             case _:
                 raise InputError("lesson", key, "a control of its steps")

@@ -24,6 +24,7 @@ from app.viewer.lessons.velocity.jog import BUTTONS, button, step
 from app.viewer.lessons.velocity.null_motion import MOVING, after
 from app.viewer.lessons.velocity.questions import outline
 from app.viewer.lessons.velocity.settings import FIRST, LARGEST, VelocitySettings
+from app.viewer.scene.gizmo import DragEvent
 from app.viewer.step_out import FINDING, STEP_HINT
 from kin.transforms import Array
 
@@ -159,9 +160,9 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         size = float(np.linalg.norm(self.settings.statics.force)) or -FIRST[2]
         self._push((size * self.facts.least[0]).tolist())
 
-    def on_tip(self, phase: str, place: Sequence[float]) -> None:
-        if phase != "start":
-            self._push([x / force_scale(self.stage.now.robot) for x in place])
+    def on_tip(self, pull: DragEvent) -> None:
+        if pull.phase != "start":
+            self._push([x / force_scale(self.stage.now.robot) for x in pull.position])
 
     def on_line_start(self) -> None:
         self.change(start=self.stage.now.goal, plot=section_views.note_html(section_views.HERE))

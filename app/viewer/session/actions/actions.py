@@ -122,8 +122,6 @@ class Actions:
             self.history.proceed()
             return True
         longest = pause_within(gesture, value)
-        if gesture[0] == "feature" and gesture[2] == "grab":
-            self._gesture = None
         if gesture != self._gesture or longest == 0.0 or now - self._changed_at > longest:
             return False
         self._changed_at = now

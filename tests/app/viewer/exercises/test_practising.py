@@ -221,6 +221,12 @@ def test_motions_are_put_in_order_and_frames_placed(server: int) -> None:
         tab.wait(lambda: "✓ Right" in shown(tab))
         press(tab, ["open", frame.id, 21])
         tab.wait(lambda: "Drag the ghost" in shown(tab))
+        (ghost,) = [name for name in tab.nodes if name.endswith("/ghost")]
+        at = {"name": ghost, "owner": tab.nodes[ghost]["owner"]}
+        tab.send("TransformControlsDragStartMessage", **at)
+        tab.send("TransformControlsUpdateMessage", **at, position=[0.1, 0.2, 0.3], wxyz=[1.0, 0.0, 0.0, 0.0])
+        tab.send("TransformControlsDragEndMessage", **at)
+        tab.wait(lambda: 'value="100 200 300 0 0 0"' in shown(tab))
         press(tab, ["fields", 22], [["0 0"]])
         tab.wait(lambda: "needs another count of numbers" in shown(tab))
         press(tab, ["fields", 23], [["0 0 0 0 0 0"]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -51,7 +52,7 @@ def bodies(tab: FakeBrowser) -> dict[str, tuple[int, ...]]:
     return {
         name: tuple(m["props"]["color"])
         for name, m in tab.nodes.items()
-        if name.startswith("/obstacle-") and "color" in m["props"] and "gizmo" not in name
+        if "/obstacle-" in name and "color" in m["props"] and "gizmo" not in name
     }
 
 
@@ -66,7 +67,7 @@ def test_a_table_is_added_typed_and_taken_back(port: int) -> None:
         say(tab, "set", "z", value="0.35 m")
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz[2] == 0.35)
         say(tab, "set", "width", value="-5")
-        assert "valid: 0.1 mm to 100 m" in tab.html
+        assert "Valid: 0.1 to 100000 mm" in tab.html
         assert 'aria-invalid="true"' in tab.html
         say(tab, "set", "width", value="2*400")
         assert 'aria-invalid="true"' not in tab.html
@@ -160,8 +161,10 @@ def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
         tab.send("TransformControlsDragStartMessage", name=gizmo, owner=owner)
         place = {"position": (0.1, 0.9, 0.5), "wxyz": (1.0, 0.0, 0.0, 0.0)}
         tab.send("TransformControlsUpdateMessage", name=gizmo, owner=owner, **place)
-        (travel,) = (name for name in tab.nodes if name.startswith("/travel-obstacle-"))
-        tab.wait(lambda: tab.nodes[travel]["props"]["text"] == "Δ 559 mm")
+        travel = re.compile("/obstacles-.*/travel")
+        tab.wait(
+            lambda: [m["props"]["text"] for name, m in tab.nodes.items() if travel.match(name)] == ["Δ 559 mm"]
+        )
         tab.send("TransformControlsDragEndMessage", name=gizmo, owner=owner)
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == (0.1, 0.9, 0.5))
         tab.wait(lambda: tab.script["undo"] == "Drag of an obstacle")

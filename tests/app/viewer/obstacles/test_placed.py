@@ -14,6 +14,7 @@ from app.viewer.obstacles.words import sentence
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode
 from kin.collision.contacts import surroundings
 from kin.collision.obstacles import MOST_OBSTACLES, SHAPES
+from kin.typed import EntryError
 from kin.units import DEFAULT_UNITS
 
 ROBOTS = CLASSICS
@@ -48,30 +49,35 @@ def test_there_is_a_largest_number():
 
 def test_fields_are_changed_one_by_one():
     (can,) = placed.added((), "cylinder", UR5, UR5.q_home)
-    for field, value in (("x", 0.25), ("yaw", 1.0), ("radius", 0.3), ("height", 2.0)):
-        (can,) = placed.changed((can,), 0, field, value)
+    for field, text in (("x", "250"), ("yaw", "1 rad"), ("radius", "30 cm"), ("height", "2 m")):
+        (can,) = placed.typed((can,), 0, field, text, DEFAULT_UNITS)
     assert (can.xyz[0], can.rpy[2], can.radius, can.height) == (0.25, 1.0, 0.3, 2.0)
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
+    ("field", "text", "valid"),
     [
-        ("x", 1001.0),
-        ("x", math.nan),
-        ("z", math.inf),
-        ("radius", 0.0),
-        ("radius", 101.0),
-        ("yaw", math.nan),
-        ("length", 1.0),
-        ("colour", 1.0),
-        ("roll", 1e9),
+        ("x", "1001 m", "−1000000 to 1000000 mm"),
+        ("x", "nan", "−1000000 to 1000000 mm"),
+        ("z", "1e999", "−1000000 to 1000000 mm"),
+        ("radius", "0", "0.1 to 100000 mm"),
+        ("radius", "101 m", "0.1 to 100000 mm"),
+        ("height", "", "0.1 to 100000 mm"),
+        ("yaw", "x", "−36000 to 36000°"),
+        ("roll", "1e9", "−36000 to 36000°"),
     ],
 )
-def test_a_value_that_is_not_valid_is_named(field, value):
-    (ball,) = placed.added((), "sphere", UR5, UR5.q_home)
-    with pytest.raises(kin.InputError) as caught:
-        placed.changed((ball,), 0, field, value)
-    assert caught.value.expected
+def test_a_text_that_is_not_valid_is_refused_with_what_would_be(field, text, valid):
+    can = placed.added((), "cylinder", UR5, UR5.q_home)
+    with pytest.raises(EntryError, match=f"Valid: {valid}"):
+        placed.typed(can, 0, field, text, DEFAULT_UNITS)
+
+
+@pytest.mark.parametrize("field", ["length", "colour", "roll"])
+def test_a_ball_has_only_its_fields(field):
+    ball = placed.added((), "sphere", UR5, UR5.q_home)
+    with pytest.raises(kin.InputError, match="x, y, z, radius"):
+        placed.typed(ball, 0, field, "1", DEFAULT_UNITS)
 
 
 def test_a_dragged_obstacle_has_round_numbers():

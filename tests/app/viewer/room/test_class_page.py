@@ -552,16 +552,16 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     teacher.wait(lambda: teacher.html.count('data-guide-do="pick"') == 3)
     teacher.say("feature", ["obstacles", ["add", "table", 1], None])
     teacher.wait(lambda: "Added: table" in teacher.html)
-    tops = [name for name in teacher.nodes if name.startswith("/obstacle-") and name.count("/") == 1]
-    assert len(tops) == 2, "the table and its arrows"
+    tops = [name for name in teacher.nodes if name.startswith("/obstacles-") and name.count("/") == 1]
+    assert len(tops) == 1, "of the table and its arrows"
     press(teacher, "wall")
     teacher.wait(lambda: sum("/wall-" in name and name.endswith("/name/2") for name in teacher.nodes) == 1)
     hidden = (teacher.gizmo, *tops)
-    assert [teacher.visible[name] for name in hidden] == [False] * 3
+    assert [teacher.visible[name] for name in hidden] == [False] * 2
     press(teacher, "wall")
-    teacher.wait(lambda: [teacher.visible[name] for name in hidden] == [True] * 3)
+    teacher.wait(lambda: [teacher.visible[name] for name in hidden] == [True] * 2)
     press(teacher, "wall")
-    teacher.wait(lambda: [teacher.visible[name] for name in hidden] == [False] * 3)
+    teacher.wait(lambda: [teacher.visible[name] for name in hidden] == [False] * 2)
     teacher.wait(lambda: any(name.endswith("/arms") for name in teacher.nodes))
     arm = next(name for name in teacher.nodes if name.endswith("/arms"))
     teacher.settle(0.6)

@@ -145,7 +145,7 @@ def test_the_name_of_a_message_is_that_of_its_event() -> None:
         (("feature", "workspace", "on"), True, 0.0),
         (("feature", "robot", ("cell", 2, "a")), "1", LONG_PAUSE),
         (("feature", "robot", ("cell", 2, "kind")), "prismatic", 0.0),
-        (("feature", "obstacles", "gizmo"), None, math.inf),
+        (("feature", "obstacles", ("drag", ("on_drag",), 1)), None, math.inf),
     ],
 )
 def test_how_long_a_step_may_pause(gesture: tuple[object, ...], value: object, pause: float) -> None:
