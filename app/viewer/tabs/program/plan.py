@@ -48,6 +48,11 @@ class Plan:
         """The motion, or the part of it that can be driven; None if that is nothing."""
         return self.motion.driven
 
+    @property
+    def duration(self) -> float:
+        """Seconds of what can be driven."""
+        return 0.0 if self.driven is None else self.driven.duration
+
     @cached_property
     def ends(self) -> tuple[float, ...]:
         """When each row is reached, and the way back; of a refused motion those before the place."""
@@ -262,16 +267,17 @@ def find_fault(plan: Plan, locked: Sequence[float | None], units: Units) -> Faul
     """
     if plan.motion.refusal is not None:
         return _refused(plan, plan.motion.refusal, units)
-    for index, q in ((index, q) for index, row in enumerate(plan.q) for q in row):
-        for joint, value in enumerate(locked):
-            if value is not None and abs(q[joint] - value) > SAME:
+    held = [(joint, value) for joint, value in enumerate(locked) if value is not None]
+    for index, row in enumerate(plan.q):
+        for joint, value in held:
+            if off := [float(q[joint]) for q in row if abs(q[joint] - value) > SAME]:
                 unit = units.of(bool(plan.motion.robot.revolute[joint]))
                 words = (
                     f"Joint {joint + 1} is locked at {unit.text(value)}, and this waypoint has it at "
-                    f"{unit.text(float(q[joint]))}. Unlock the joint, or set the waypoint to another pose."
+                    f"{unit.text(off[0])}. Unlock the joint, or set the waypoint to another pose."
                 )
                 return Fault(index, words, whole=True)
-    return _moved(plan, plan.motion, locked)
+    return _moved(plan, held)
 
 
 def _refused(plan: Plan, refusal: Refusal, units: Units) -> Fault:
@@ -297,12 +303,11 @@ def _of_tool(plan: Plan, index: int) -> bool:
     return index < len(plan.segments) and isinstance(plan.segments[index], Lin | Circ | Spline)
 
 
-def _moved(plan: Plan, motion: Motion, locked: Sequence[float | None]) -> Fault | None:
-    """A path on which a locked joint would move between two waypoints."""
-    joints = [(joint, value) for joint, value in enumerate(locked) if value is not None]
-    times = np.linspace(0.0, motion.duration, SAMPLES)
-    q = motion.derivatives(times)[0] if joints else np.zeros((0, motion.robot.n))
-    for joint, value in joints:
+def _moved(plan: Plan, held: Sequence[tuple[int, float]]) -> Fault | None:
+    """A path on which a joint that is held at a value would move between two waypoints."""
+    times = np.linspace(0.0, plan.duration, SAMPLES if held else 0)
+    q = plan.motion.derivatives(times)[0]
+    for joint, value in held:
         off = np.flatnonzero(np.abs(q[:, joint] - value) > LOOSE)
         if off.size:
             index = plan.row_at(float(times[off[0]])) or 0

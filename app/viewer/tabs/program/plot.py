@@ -28,7 +28,7 @@ def plot_html(motion: Motion | None, joint: int | None, units: Units, other: Mot
 
     `other`: a motion of the same arm to compare it with.
     """
-    if motion is None:
+    if motion is None or motion.duration == 0.0:
         return ""
     other = other if other is not None and other.planned and other.duration > 0.0 else None
     both = [each for each in (other, motion) if each is not None]

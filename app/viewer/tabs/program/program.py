@@ -36,6 +36,7 @@ MOST = 40  # waypoints, points of splines and pauses; a link holds some 8000 byt
 NAME = 40  # characters
 DIGITS = 7  # of a recorded joint value
 PAUSE = 1.0  # s, of a new pause
+LARGEST = 30_000  # bytes of a file: it comes in one message of the page
 _MET = 1e-6  # m
 
 

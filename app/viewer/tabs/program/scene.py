@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,17 +23,14 @@ FRAMES = 14  # frames along the path
 LABEL = 1.2  # of the arm's size: labels that are closer share one
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What is drawn beside waypoints and faults: the path, copies of the arm, frames along the path."""
+def nodes(plan: Plan, fault: Fault | None, ghosts: bool, frames: bool, other: Motion | None) -> Sequence[Node]:
+    """Everything.
 
-    path: bool = True
-    ghosts: bool = False
-    frames: bool = False
-
-
-def nodes(plan: Plan, fault: Fault | None, shown: Shown, other: Motion | None) -> Sequence[Node]:
-    """Everything; `fault`: what cannot be driven, `other`: a motion that is compared with the program."""
+    Args:
+        fault: what cannot be driven.
+        ghosts, frames: whether copies of the arm, and frames along the path, are shown.
+        other: a motion that is compared with the program.
+    """
     robot, driven = plan.motion.robot, plan.driven
     size = body(robot).size
     poses = fk(robot, plan.waypoints)
@@ -49,11 +45,11 @@ def nodes(plan: Plan, fault: Fault | None, shown: Shown, other: Motion | None) -
     for i, row in enumerate(plan.segments):
         if isinstance(row, Circ):
             found.append(_dot(f"via-{i}", 0.3 * size, VIA, 1.0, np.array(row.via)))
-    if shown.ghosts:
+    if ghosts:
         found.append(_ghosts(plan))
     if driven is not None and driven.duration > 0.0:
         found += _path(plan, size)
-        if shown.frames:
+        if frames:
             found.append(_frames(plan, size))
     if other is not None and other.planned and other.duration > 0.0:
         points = tool_path(other)[0][:, :3, 3]

@@ -13,7 +13,6 @@ from app.viewer.own_arm import KEY
 from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion
 from app.viewer.tabs.program.plan import Asked, Fault, Plan, find_fault, plan
 from app.viewer.tabs.program.program import Segments, fits, places, targets
-from app.viewer.tabs.program.scene import Shown
 from app.viewer.tabs.program.ways import USUAL
 from kin.motion import Motion, Program
 from kin.transforms import Array
@@ -69,11 +68,6 @@ class ProgramSettings(Settings):
     playing: bool = memory(False)
     sent: Array | None = memory()
     leads: bool = memory(False)
-
-    @property
-    def shown(self) -> Shown:
-        """What is drawn."""
-        return Shown(self.path, self.ghosts, self.frames)
 
 
 class Planned:
@@ -134,14 +128,9 @@ class ProgramFacts(Facts[ProgramSettings]):
         return None if self.plan is None or not self.plan.motion.planned else self.motion
 
     @property
-    def lasting(self) -> Motion | None:
-        """The motion, if it takes time."""
-        return self.motion if self.duration > 0.0 else None
-
-    @property
     def duration(self) -> float:
         """Seconds of the motion."""
-        return 0.0 if self.motion is None else self.motion.duration
+        return 0.0 if self.plan is None else self.plan.duration
 
     @cached_property
     def fault(self) -> Fault | None:
@@ -151,9 +140,9 @@ class ProgramFacts(Facts[ProgramSettings]):
         return self.planned.find_fault(self.plan, self.arm.options.constraints.locks(self.robot) or (), self.units)
 
     @property
-    def playable(self) -> Motion | None:
-        """The motion that can be played."""
-        return None if self.fault is not None and self.fault.whole else self.lasting
+    def playable(self) -> bool:
+        """Whether there is a motion to be played."""
+        return self.duration > 0.0 and not (self.fault is not None and self.fault.whole)
 
     @property
     def time(self) -> float:
@@ -166,11 +155,6 @@ class ProgramFacts(Facts[ProgramSettings]):
         if time < self.duration:
             return time
         return time % self.duration if self.settings.loop and self.duration > 0.0 else None
-
-    @property
-    def here(self) -> int | None:
-        """Index of the row that is driven now; that of the way back is the number of rows."""
-        return None if self.plan is None else self.plan.row_at(self.time)
 
     @property
     def other(self) -> Motion | None:

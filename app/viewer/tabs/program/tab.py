@@ -23,21 +23,22 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Html, Node
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.work import Sweep, Work, in_background
+from app.viewer.feature import save_file, sent_text
 from app.viewer.own_arm import KEY
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.program import postures, scene, views, ways
 from app.viewer.tabs.program import program as rows
-from app.viewer.tabs.program.files import motion_file, read
+from app.viewer.tabs.program.files import motion_file
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.plot import plot_html
-from app.viewer.tabs.program.program import MOST, PAUSE, Segments, recorded, replaced, targets
+from app.viewer.tabs.program.program import LARGEST, MOST, PAUSE, Segments, recorded, replaced, targets
 from app.viewer.tabs.program.settings import Planned, ProgramFacts, ProgramSettings
-from app.viewer.tabs.program.typed import Fields
+from app.viewer.tabs.program.typed import NUMBERS, Fields
 from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
-from kin.motion import Circ, Dwell, Program, Ptp, Spline
+from kin.motion import Circ, Dwell, Program, Ptp, Spline, parse_program
 from kin.motion.program import Kind, Segment, Target
 from kin.path import PathPostures
 from kin.transforms import Array
@@ -87,29 +88,25 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
 
     def panel(self) -> Sequence[Node]:
         f, s, units = self.read, self.settings, self.stage.units
-        opened, search = (f.chosen, f.point), (s.seconds, s.seed)
-        frame = self._fields.frame
+        opened, search, drawn = (f.chosen, f.point), (s.seconds, s.seed), (s.path, s.ghosts, s.frames)
         found = f.work("way") if s.search else None
         return [
-            Html(views.player, (f.plan, f.playable, s.rate, s.loop, s.shown, units)),
-            Html(views.clock, (f.time, f.duration, s.playing, f.here)),
-            Html(
-                views.list_html,
-                (f.plan, opened, f.fault, s.loop, f.robot, units, frame, f.arm.task, s.by_pose, s.revision),
-            ),
+            Html(views.player, (f.plan, f.playable, s.rate, s.loop, drawn, units)),
+            Html(views.clock, (f.plan, f.time, s.playing)),
+            Html(views.list_html, (f.plan, opened, f.fault, s.loop, self._fields, s.by_pose, s.revision)),
             Html(postures.html, (f.chart, f.work("postures").value, units)),
             Html(ways.html, (f.way, found, search, units)),
-            Html(plot_html, (f.lasting, s.joint, units, f.other)),
+            Html(plot_html, (f.motion, s.joint, units, f.other)),
             Html(views.summary, (f.plan, s.own, units)),
             Html(views.comparison, (f.whole, f.other, s.compare, s.zone, units)),
             Html(views.files, (f.motion, bool(f.segments), s.own, self.stage.service, s.language)),
         ]
 
     def scene(self) -> Sequence[Lazy]:
-        f, shown = self.facts, self.settings.shown
-        if f.plan is None or not shown.path:
+        f, s = self.facts, self.settings
+        if f.plan is None or not s.path:
             return ()
-        return [Lazy("drawing", scene.nodes, (f.plan, f.fault, shown, f.other))]
+        return [Lazy("drawing", scene.nodes, (f.plan, f.fault, s.ghosts, s.frames, f.other))]
 
     def running(self) -> Sequence[Work | Sweep]:
         f, s = self.facts, self.settings
@@ -190,7 +187,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         self.schedule()
         self.invalidate()
         f = self.facts
-        if on and f.playable is None:
+        if on and not f.playable:
             words = "no program" if f.fault is None else f.fault.words
             raise InputError("play", words, "a program of at least two poses that can be driven")
         if on:
@@ -235,7 +232,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
                 self._use(())
             case "play" if s.playing:
                 self._stop()
-            case "play" if f.playable is not None:
+            case "play" if f.playable:
                 self._play(0.0 if f.time >= f.duration else f.time)
             case "play":
                 words = "Record at least two poses." if f.fault is None else f.fault.words
@@ -480,7 +477,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if not isinstance(text, str):
             raise InputError(name, text, "a text")
         try:
-            self.change(**{name: self._fields.blend(text) if name == "zone" else ways.read_setting(name, text)})
+            self.change(**{name: (ways.SETTINGS | {"zone": NUMBERS["blend"]})[name].read(text, self.stage.units)})
         except EntryError as error:
             self._refuse(error.title, error.detail)
 
@@ -501,7 +498,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
     def _play_on(self, seconds: float) -> None:
         """Show the next frame."""
         f, s, now = self.facts, self.settings, self.stage.now
-        if f.playable is None or s.sent is None or not np.array_equal(s.sent, now.goal):
+        if not f.playable or s.sent is None or not np.array_equal(s.sent, now.goal):
             self._stop()  # the visitor has moved the arm, or changed the program
         elif s.leads:
             self.change(leads=not np.array_equal(now.q, now.goal))
@@ -543,18 +540,13 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
 
     # Files
 
-    def _send(self, name: str, data: bytes, words: str) -> None:
-        self.stage.client.send_file_download(name, data, save_immediately=True)
-        self.stage.notify(Notice("hand", f"{name} is saved", words))
-
     def _download(self) -> None:
         f = self.facts
         if f.plan is None:
             return
         robot = named(f.robot) if self.settings.own else f.robot
         program = replace(f.plan.motion.program, name=robot.name[:100])
-        data = toml_of(program, robot.name).encode()
-        self._send(f"{robot.id}-program.toml", data, "Your browser has put it where it puts downloads.")
+        save_file(self.stage, f"{robot.id}-program.toml", toml_of(program, robot.name))
 
     def _save(self, name: object) -> None:
         """Download the motion over time, or the part of it that can be driven."""
@@ -568,11 +560,11 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
             self._refuse("The motion was not saved", f"This format is for {error.expected}.")
             return
         part = "" if f.whole is not None else "Only up to where the program ends. "
-        self._send(file, data, f"{part}{sampled}Radians, metres and seconds.")
+        save_file(self.stage, file, data, f"{part}{sampled}Radians, metres and seconds.")
 
     def _upload(self, value: object) -> None:
         try:
-            name, program = read(value, self.facts.robot)
-            self._open_program(program, name)
+            name, text = sent_text(value, LARGEST)
+            self._open_program(parse_program(text, self.facts.robot), name or "program")
         except KinematicsError as error:
             self._refuse("The file was not used", str(error))

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.snippets import Service
@@ -13,22 +10,20 @@ from app.viewer.live.tape import BYTES
 from app.viewer.panel.share import box_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.program.compare import CHOICES, Choice, about, jerk_is_infinite
-from app.viewer.tabs.program.files import LARGEST, MOTIONS
+from app.viewer.tabs.program.files import MOTIONS
 from app.viewer.tabs.program.plan import Fault, Plan
-from app.viewer.tabs.program.program import MOST, Segments, places, start_of
-from app.viewer.tabs.program.scene import Shown
+from app.viewer.tabs.program.program import LARGEST, MOST, Segments, places, start_of
 from app.viewer.tabs.program.settings import RATES
-from app.viewer.tabs.program.typed import Fields
+from app.viewer.tabs.program.typed import NUMBERS, Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
-from kin import Robot
-from kin.ik import Task
 from kin.motion import Dwell, Motion, MotionLimits, Peak, Spline
-from kin.motion.arrivals import Arrival
+from kin.motion.details import ArrivesOtherwise
+from kin.motion.messages import note
 from kin.motion.program import Kind, Segment, kind_of
 from kin.motion.results import Quantity
 from kin.transforms import Array
-from kin.units import Units, fixed, general
+from kin.units import Units, fixed, typeset
 
 KINDS: dict[Kind, tuple[str, str]] = {
     "ptp": ("PTP – straight in the joints", "PTP"),
@@ -47,26 +42,32 @@ STATES = (
 )
 
 
-def player(plan: Plan | None, playable: Motion | None, rate: float, loop: bool, drawn: Shown, units: Units) -> str:
-    """Buttons and time; below them the meaning of the path's colours."""
+def player(
+    plan: Plan | None, playable: bool, rate: float, loop: bool, drawn: tuple[bool, bool, bool], units: Units
+) -> str:
+    """Buttons and time; below them the meaning of the path's colours.
+
+    `drawn`: whether the path, copies of the arm, and frames are shown.
+    """
     if plan is None:
         return ""
-    top_speed = plan.top_speed if drawn.path else 0.0
+    top_speed = plan.top_speed if drawn[0] else 0.0
     top = f"{units.lengths.number(top_speed, 0)} {units.lengths.name}/s"
     legend = bar("program", f"0 {units.lengths.name}/s", top, "speed of the tool along its path", "viridis")
     return render(
         "program/player",
-        playable=playable is not None,
-        duration=0.0 if plan.driven is None else plan.driven.duration,
+        playable=playable,
+        duration=plan.duration,
         rates=[(each, name, each == rate) for name, each in RATES.items()],
         loop=loop,
-        drawn=drawn,
+        drawn=dict(zip(("path", "ghosts", "frames"), drawn, strict=True)),
         legend=legend if top_speed > 1e-6 else "",
     )
 
 
-def clock(time: float, duration: float, playing: bool, here: int | None) -> str:
-    """The present moment, for the page's own script; `here`: index of the row that is driven."""
+def clock(plan: Plan | None, time: float, playing: bool) -> str:
+    """The present moment, for the page's own script."""
+    duration, here = (0.0, None) if plan is None else (plan.duration, plan.row_at(time))
     return render("program/clock", time=f"{time:.3f}", duration=f"{duration:.3f}", playing=playing, here=here)
 
 
@@ -93,10 +94,7 @@ def list_html(
     opened: tuple[int | None, int],
     fault: Fault | None,
     loop: bool,
-    robot: Robot,
-    units: Units,
-    frame: Array,
-    task: Task,
+    fields: Fields,
     by_pose: bool,
     revision: int,
 ) -> str:
@@ -104,11 +102,9 @@ def list_html(
 
     Args:
         opened: index of the row that is open, and which of its points the fields are of.
-        frame, task: as of `Fields`.
         by_pose: whether its values are those of the tool, not of the joints.
         revision: another one replaces what was typed into the fields.
     """
-    fields = Fields(robot, units, frame, task)
     segments = () if plan is None else plan.segments
     chosen, back = opened[0], None
     if loop and plan is not None:
@@ -138,14 +134,14 @@ def list_html(
 
 def _row(plan: Plan, index: int, fault: Fault | None, fields: Fields) -> dict[str, object]:
     """What the list shows of a row."""
-    segment, otherwise = plan.segments[index], plan.arrives_otherwise(index)
+    segment = plan.segments[index]
     return {
         "title": title(index, segment),
         "words": _words(plan.segments, index, fields),
         "time": f"{plan.ends[index]:.2f} s" if index < len(plan.ends) else "",
         "kind": kind_of(segment),
         "row": segment,
-        "otherwise": None if otherwise is None else _otherwise(otherwise, fields),
+        "otherwise": _otherwise(plan, index, fields),
         "starts": index == start_of(plan.segments),
         "fault": fault if fault is not None and fault.index == index else None,
     }
@@ -157,27 +153,19 @@ def title(index: int, segment: Segment) -> str:
     return segment.name or usual.get(type(segment), f"Waypoint {index + 1}")
 
 
-class Otherwise(NamedTuple):
+def _otherwise(plan: Plan, index: int, fields: Fields) -> dict[str, object] | None:
     """An arrival in other joint values than recorded, as it is shown: a headline, a sentence, the true values."""
-
-    title: str
-    detail: str
-    values: list[str]
-
-
-def _otherwise(arrival: Arrival, fields: Fields) -> Otherwise:
-    assert arrival.difference is not None
+    arrival = plan.arrives_otherwise(index)
+    if arrival is None or plan.driven is None:
+        return None
     others = arrival.posture != arrival.recorded_posture
-    title = "Arrives in another posture" if others else "Arrives in other joint values"
-    joint = int(np.argmax(np.round(np.abs(arrival.difference), 6)))
-    units = [fields.units.of(turning) for turning in fields.robot.revolute.tolist()]
-    away = units[joint].text(abs(float(arrival.difference[joint])))
-    name = fields.robot.joints[joint].name
-    detail = f"The same pose, but joint {joint + 1} ({name}) is {away} from its recorded value."
-    if others:
-        detail += f" It arrives as {arrival.posture}; recorded is {arrival.recorded_posture}."
-    values = [unit.number(value, 3) for unit, value in zip(units, arrival.q.tolist(), strict=True)]
-    return Otherwise(title, detail, values)
+    facts = [each for each in plan.driven.notes if isinstance(each, ArrivesOtherwise) and each.segment == index]
+    units = map(fields.units.of, fields.robot.revolute.tolist())
+    return {
+        "title": "Arrives in another posture" if others else "Arrives in other joint values",
+        "detail": typeset(" ".join(note(each, fields.units) for each in facts)),
+        "joints": [unit.number(value, 3) for unit, value in zip(units, arrival.q.tolist(), strict=True)],
+    }
 
 
 def _words(segments: Segments, index: int, fields: Fields) -> str:
@@ -193,9 +181,9 @@ def _words(segments: Segments, index: int, fields: Fields) -> str:
     if row.speed != 1.0:
         words += f" at {100.0 * row.speed:g} %"
     if row.tool_speed is not None:
-        words += f" ≤ {fields.size(row.tool_speed)} {lengths.name}/s"
+        words += f" ≤ {lengths.brief(row.tool_speed, 6)}/s"
     if row.blend:
-        words += f", zone {fields.size(row.blend)} {lengths.name}"
+        words += f", zone {lengths.brief(row.blend, 6)}"
     return words
 
 
@@ -279,7 +267,7 @@ def comparison(
         "program/compare",
         choices=CHOICES,
         choice=choice,
-        zone=general(zone * lengths.scale) if zone else "",
+        zone=NUMBERS["blend"].cell("zone", zone, units)["value"],
         unit=lengths.name,
         rows=rows,
         words=words or (about(choice, motion) if choice is not None else ""),

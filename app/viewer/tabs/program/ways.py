@@ -14,29 +14,22 @@ import numpy as np
 import kin.way
 from app.shared.computations import SharedComputation
 from app.viewer.declared.work import Result
+from app.viewer.panel.entry import SECONDS, NumberField
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.program import MOST, Segments, options, places, recorded
-from app.viewer.tabs.program.typed import SECONDS, read_number
 from app.viewer.views.templates import render
 from kin.motion import Dwell, JointTarget, Ptp
 from kin.motion.program import Segment
-from kin.typed import EntryError
 from kin.units import Unit, Units
 from kin.way import MOST_SEED, find_way, way_program
 
 SHORTEST, USUAL, LONGEST = 0.1, 5.0, 60.0  # seconds of a search
 STEPS = 100  # of its progress
-_WHOLE = Unit("", 1.0, 0)
-
-
-def read_setting(name: str, text: object) -> float | int:
-    """A typed time limit or seed; raises `EntryError`, which says what would be valid."""
-    if name == "seconds":
-        return read_number(text, SECONDS, SHORTEST, LONGEST)
-    value = read_number(text, _WHOLE, 0.0, float(MOST_SEED))
-    if value != int(value):
-        raise EntryError("The field stays as it was", f"The seed is a whole number from 0 to {MOST_SEED}.")
-    return int(value)
+SEED_HINT = "The search is random: another seed may find another way, the same seed finds the same one again"
+SETTINGS = {
+    "seconds": NumberField("Time limit", SHORTEST, LONGEST, SECONDS),
+    "seed": NumberField("Seed", 0, MOST_SEED, Unit("", 1.0, 0), SEED_HINT, whole=True),
+}
 
 
 @dataclass(frozen=True)
@@ -119,7 +112,7 @@ def html(asked: Asked | None, result: Result | None, settings: tuple[float, int]
     """The form, or how far the search is; `result`: of the search, None without one."""
     if asked is None:
         return ""
-    arm = asked.arm
+    arm, fields = asked.arm, zip(SETTINGS.items(), settings, strict=True)
     start = asked.plan.before(asked.index)
     none = result.value if result is not None and isinstance(result.value, NotFound) else None
     return render(
@@ -132,7 +125,7 @@ def html(asked: Asked | None, result: Result | None, settings: tuple[float, int]
         title="" if none is None else none.title,
         words="" if none is None else none.explain(units),
         seconds=settings[0],
-        seed=settings[1],
+        fields=[field.cell(f"way-{name}", value, units) for (name, field), value in fields],
     )
 
 

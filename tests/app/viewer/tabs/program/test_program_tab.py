@@ -295,7 +295,7 @@ def test_a_line_that_arrives_otherwise_shows_its_true_values_and_each_remedy_hol
     assert part(ur5, "list").count(OTHER) == 1
     before, after = recorded(ur5, 0), recorded(ur5, 1)
     words = html.unescape(part(ur5, "list"))
-    assert "149.3° from its recorded value" in words
+    assert "is 149.3° away" in words
     shown = re.findall(r"On arrival:</span> (.*?)</p>", words)[0]
     arrival = np.radians([float(text.replace("−", "-")) for text in shown.split(", ")])
     press(ur5, "go", 1)
