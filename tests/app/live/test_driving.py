@@ -248,12 +248,30 @@ def test_a_wrist_outside_its_limits_stays_there_and_comes_back_without_a_turn(ri
     assert degrees(CALIBRATIONS["full turn"], rig.positions)[4] == pytest.approx(there, abs=0.1)
 
 
+def test_a_wrist_is_on_the_turn_on_which_its_limits_hold_it(rig):
+    """The middle of its range is at 170°, outside the limits; where it is, at 230° then, is -130°, inside."""
+    rig.page.robot = replace(
+        ARM, motors=tuple(replace(motor, offset=-170.0 * (motor.id == 5)) for motor in ARM.motors), id="turned"
+    )
+    rig.place(5, 2730)
+
+    def move(t: float) -> None:
+        if t > 0.2:
+            rig.page.q = np.append(rig.page.q[:4], np.radians(-100.0))
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"])
+    assert rig.said == ""
+    assert rig.positions[4] == pytest.approx(2730 + 30.0 * 4095.0 / 360.0, abs=1)
+    assert min(rig.goals(5)) == 2730, "straight there"
+
+
 def test_no_joint_is_led_beyond_its_calibrated_range_or_the_limits_of_the_page(rig):
     table = CALIBRATIONS["narrower than the model"]
     rng = np.random.default_rng(3)
 
     def move(t: float) -> None:
-        if round(t / so101_arm.CYCLE) % 40 == 0:
+        if round(t / so101_arm.CYCLE) % 100 == 0:  # long enough to rest at an end
             rig.page.q = ARM.random_q(rng) * 3.0  # a page would not show this
 
     rig.clock.each = move
