@@ -180,7 +180,8 @@ def distances_to_each(
     place(model, rows, shape, q, ends)
     for w in range(watched.shape[0]):
         for k in range(solids.shape[0]):
-            out[w, k] = nearest_on(ends, watched[w], solids, k, a)[0] - shape[watched[w], 6]
+            apart, _ = nearest_on(ends, watched[w], solids, k, a)
+            out[w, k] = apart - shape[watched[w], 6]
 
 
 @jit
@@ -214,5 +215,6 @@ def margins(
             for k in range(solids.shape[0]):
                 if _beyond_ball(ends, shape, first, solids, k, lost):
                     continue
-                apart = nearest_on(ends, first, solids, k, a)[0] - shape[first, 6]
+                apart, _ = nearest_on(ends, first, solids, k, a)
+                apart -= shape[first, 6]
                 out[j, 0], out[j, 1] = min(out[j, 0], apart), min(out[j, 1], apart - lost)

@@ -235,7 +235,7 @@ def _put(out: Array, k: int, first: int, total: int, low: float, high: float) ->
 @jit
 def select(q: Array, key: Array) -> tuple[Whole, int]:
     """Rows of q ``(k, n)`` with a finite key, by rising key, equal rows once: (rows, count); overwrites `key`."""
-    kept = np.empty(q.shape[0], dtype=np.int64)
+    kept = np.zeros(q.shape[0], dtype=np.int64)
     count = 0
     for _ in range(q.shape[0]):
         i = -1

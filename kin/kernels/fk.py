@@ -265,9 +265,9 @@ def fk_many(model: Array, q: Array, out: Array) -> bool:
     for first in range(0, q.shape[0], BLOCK):
         count = min(BLOCK, q.shape[0] - first)
         for r in range(3):
-            for c in range(4):
+            for k in range(4):
                 for b in range(count):
-                    S[_T0 + (4 * r + c) * BLOCK + b] = T[r, c]
+                    S[_T0 + (4 * r + k) * BLOCK + b] = T[r, k]
         for i in range(int(model[0])):
             bad += _joint_block(model, i, q, first, count, S)
             a, ca, sa = x_part(model, i + ahead)
@@ -284,8 +284,8 @@ def fk_many(model: Array, q: Array, out: Array) -> bool:
                 x = S[_T0 + 4 * r * BLOCK + b]
                 y = S[_T1 + 4 * r * BLOCK + b]
                 z = S[_T2 + 4 * r * BLOCK + b]
-                for c in range(3):
-                    out[first + b, r, c] = x * model[15 + c] + y * model[19 + c] + z * model[23 + c]
+                for k in range(3):
+                    out[first + b, r, k] = x * model[15 + k] + y * model[19 + k] + z * model[23 + k]
                 out[first + b, r, 3] = S[_T3 + 4 * r * BLOCK + b] + (x * model[18] + y * model[22] + z * model[26])
             out[first + b, 3, 0] = 0.0
             out[first + b, 3, 1] = 0.0

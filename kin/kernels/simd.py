@@ -71,7 +71,7 @@ def widest(typing: Any) -> Any:
 
 
 @_build
-def _bits(typing: Any, x: Any) -> Any:
+def bits_of(typing: Any, x: Any) -> Any:
     """The 64 bits of a float as an integer."""
     del typing, x
 
@@ -82,7 +82,7 @@ def _bits(typing: Any, x: Any) -> Any:
 
 
 @_build
-def _float(typing: Any, bits: Any) -> Any:
+def float_of(typing: Any, bits: Any) -> Any:
     """The float of 64 bits."""
     del typing, bits
 
@@ -97,7 +97,7 @@ def sin_cos(x: float) -> tuple[float, float]:
     """(sin x, cos x) for |x| ≤ `WIDE`; less accurate beyond it. NaN and infinities give NaN."""
     shifted = x * 0.6366197723675814 + _ROUND
     k = shifted - _ROUND
-    quadrant = _bits(shifted)
+    quadrant = bits_of(shifted)
     r = fma(-k, 2.0222662487959506e-21, fma(-k, 6.077100506303966e-11, fma(-k, 1.5707963267341256, x)))
     z = r * r
     p = fma(z, fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08), 2.75573137070700676789e-06)
@@ -113,7 +113,7 @@ def sin_cos(x: float) -> tuple[float, float]:
     odd = (quadrant & 1) != 0
     s = cosine if odd else sine
     c = sine if odd else cosine
-    return _float(_bits(s) ^ ((quadrant & 2) << 62)), _float(_bits(c) ^ (((quadrant + 1) & 2) << 62))
+    return float_of(bits_of(s) ^ ((quadrant & 2) << 62)), float_of(bits_of(c) ^ (((quadrant + 1) & 2) << 62))
 
 
 @inlined
@@ -125,7 +125,7 @@ def sin_cos_quarters(y: float) -> tuple[float, float]:
     """
     shifted = y + _ROUND
     r = y - (shifted - _ROUND)
-    quadrant = _bits(shifted)
+    quadrant = bits_of(shifted)
     z = r * r
     p = fma(z, fma(z, 0.00015820628792786513, -0.004681266248964948), 0.07969258272440714)
     sine = r * fma(z, fma(z, p, -0.6459640961467292), 1.5707963267880989)
@@ -134,7 +134,7 @@ def sin_cos_quarters(y: float) -> tuple[float, float]:
     odd = (quadrant & 1) != 0
     s = cosine if odd else sine
     c = sine if odd else cosine
-    return _float(_bits(s) ^ ((quadrant & 2) << 62)), _float(_bits(c) ^ (((quadrant + 1) & 2) << 62))
+    return float_of(bits_of(s) ^ ((quadrant & 2) << 62)), float_of(bits_of(c) ^ (((quadrant + 1) & 2) << 62))
 
 
 @inlined

@@ -173,7 +173,7 @@ def many(
     """
     values, near = request
     limits = unbounded(near.shape[0])
-    around = (values, near.reshape((1, near.shape[0])), limits[0], limits[1])
+    around = (values, near.reshape(1, near.shape[0]), limits[0], limits[1])
     each(pairs, angles, store, careful, (rows, True), params, T, around, out)
 
 

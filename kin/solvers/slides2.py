@@ -126,13 +126,14 @@ def _surely_regular(params: Array, q: Array) -> bool:
     the sum of all squares.
     """
     J, P, lines = np.empty((6, 3)), np.empty((4, 4)), np.empty((3, 7))
+    turn = int(params[TURN_AT])
     for row in range(q.shape[0]):
         if math.isnan(q[row, 0]):
             continue
         jacobian_into(params[MODEL:], q[row], J, P, lines)
         squares = 0.0
         for i in range(3):
-            J[i, int(params[TURN_AT])] /= params[REACH]
+            J[i, turn] /= params[REACH]
             squares += dot(J[i], J[i])
         if abs(triple(J[0], J[1], J[2])) <= REGULAR * squares:
             return False

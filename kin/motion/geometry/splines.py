@@ -58,12 +58,25 @@ def spline(s: Array, q: Array) -> Array:
 
 
 @jit
+def knots_before(knots: Array, s: float, equal: bool) -> int:
+    """How many of the ascending knots ``(k,)`` are less than s, or equal to it as well."""
+    low, high = 0, knots.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if knots[middle] < s or (equal and knots[middle] == s):
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@jit
 def values_into(s: Array, pieces: Array, at: Array, out: Array) -> None:
     """out ← the spline at points ``(m,)``: ``(m, n)``."""
     i, last = 0, pieces.shape[0] - 1
     for m in range(at.shape[0]):
         if i > 0 and at[m] < s[i]:
-            i = min(max(int(np.searchsorted(s, at[m])) - 1, 0), last)
+            i = min(max(knots_before(s, at[m], False) - 1, 0), last)
         while i < last and at[m] >= s[i + 1]:
             i += 1
         d = at[m] - s[i]

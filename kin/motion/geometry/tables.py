@@ -149,9 +149,9 @@ def _plain(numbers: Numbers, index: int, s: float, T: Array) -> None:
         for r in range(3):
             T[r, 3] = row[_START + r] + c * row[_WAY + r] + d * row[_ACROSS + r]
     # exp(f·base) R0 exp(f·tool), column by column and row by row
-    for c in range(3):
-        x, y, z = row[_R0 + c], row[_R0 + 3 + c], row[_R0 + 6 + c]
-        T[0, c], T[1, c], T[2, c] = _turned(row, _BASE, f, x, y, z)
+    for k in range(3):
+        x, y, z = row[_R0 + k], row[_R0 + 3 + k], row[_R0 + 6 + k]
+        T[0, k], T[1, k], T[2, k] = _turned(row, _BASE, f, x, y, z)
     for r in range(3):
         # A row times a rotation is the inverse rotation times the row.
         T[r, 0], T[r, 1], T[r, 2] = _turned(row, _TOOL, -f, T[r, 0], T[r, 1], T[r, 2])

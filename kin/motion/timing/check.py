@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.motion.geometry.splines import knots_before
 from kin.transforms import Array
 
 BACK = 1e6  # the factor where s(t) would go back
@@ -38,8 +39,8 @@ def _met(knots: Array, clocks: Array, c: int) -> tuple[int, int]:
     """
     last, close = knots.shape[0] - 2, _SAME * knots[knots.shape[0] - 1]
     end = clocks[c + 1, 0] if c + 1 < clocks.shape[0] else knots[last + 1]
-    first = min(max(np.searchsorted(knots, clocks[c, 0] + close, side="right") - 1, 0), last)
-    return first, min(max(np.searchsorted(knots, end - close) - 1, first), last)
+    first = min(max(knots_before(knots, clocks[c, 0] + close, True) - 1, 0), last)
+    return first, min(max(knots_before(knots, end - close, False) - 1, first), last)
 
 
 @jit
@@ -100,7 +101,8 @@ def slowdowns(
         for i in range(first, last + 1):
             until = _crossing(p, knots[i + 1], begin, end) if i < last else end
             if until > begin:
-                out[c] = max(out[c], _between(p, begin, until, knots[i], shares, joints[i], limits[i], most[i]))
+                factor = _between(p, begin, until, knots[i], shares, joints[i], limits[i], most[i])
+                out[c] = max(out[c], factor)
             begin = until
 
 

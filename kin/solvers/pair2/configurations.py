@@ -201,7 +201,10 @@ def solve(params: Array, T: Array, task: int, near: Array, out: Array, notes: Ar
     alike: one that misses it by far more is none.
     """
     configurations(params, T, task, near, GONE * params[SCALE], out, notes)
-    least = notes[:, OFF].min()
+    least = notes[0, OFF]
+    for row in range(1, notes.shape[0]):
+        if notes[row, OFF] < least or math.isnan(notes[row, OFF]):
+            least = notes[row, OFF]
     for row in range(out.shape[0]):
         if notes[row, OFF] > max(REACH, _ALIKE * least):
             for i in range(out.shape[1]):

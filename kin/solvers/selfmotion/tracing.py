@@ -284,6 +284,15 @@ def _closes(curve: Curve, start: Array, tangent: Array) -> bool:
 
 
 @jit
+def _directed(tangent: Array, sense: float) -> Array:
+    """A tangent ``(7,)``, the other way round if the sense is −1.0."""
+    out = np.empty(7)
+    for i in range(7):
+        out[i] = sense * tangent[i]
+    return out
+
+
+@jit
 def _walk(
     task: Task, limits: tuple[Array, Array], margin: float, start: tuple[Array, Array], sense: float, out: Array
 ) -> tuple[int, int]:
@@ -291,7 +300,7 @@ def _walk(
 
     out ``(m, 14)`` ← further points, and tangents of the same sense. Returns why it ended, and how many they are.
     """
-    p, tangent = new_point(), sense * start[1]
+    p, tangent = new_point(), _directed(start[1], sense)
     curve = (start[0].copy(), tangent.copy(), np.empty(7), np.empty(7))
     before = (start[0].copy(), tangent.copy(), curve[0], curve[1])
     h = _FIRST
@@ -333,8 +342,8 @@ def _first_end(task: Task, limits: tuple[Array, Array], sense: float, q: Array) 
     if not newton_to_event(task, PROJECT, 0.0, y, p):
         return float(q[task.joint])
     along = math.copysign(1.0, sense * p.n[task.joint])
-    curve = (y, along * p.n, np.empty(7), np.empty(7))
-    before = (y.copy(), along * p.n, curve[0], curve[1])
+    curve = (y, _directed(p.n, along), np.empty(7), np.empty(7))
+    before = (y.copy(), _directed(p.n, along), curve[0], curve[1])
     h = _FIRST
     for _ in range(_POINTS):
         h = _advance(task, before, curve, h, along, p)

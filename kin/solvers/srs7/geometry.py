@@ -12,7 +12,7 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_pose
-from kin.solvers.common import HIGH, LOW, NEAR, merged, zyz
+from kin.solvers.common import HIGH, LOW, NEAR, merged, shifted, zyz
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -161,4 +161,4 @@ def arm_angle(arm: Array, T: Array, q: Array) -> float:
     M, triangle = np.empty((4, 4)), np.empty((4, 3))
     canonical_pose(arm, T, M)
     code, _ = triangle_of(arm, M, triangle)
-    return seed_arm_angle(arm, q + arm[OFFSET:UPPER_ARM], triangle) if code == FITS else math.nan
+    return seed_arm_angle(arm, shifted(q, arm[OFFSET:UPPER_ARM]), triangle) if code == FITS else math.nan

@@ -66,7 +66,8 @@ def raise_best(arm: BoundedArm, turns: Array, rolls: bool, T: Array, q: Array, b
             position, rotation, _ = residuals(P, T[i], APPROACH, mask, e)
             if not (position <= _POSITION and rotation <= _ROTATION):
                 continue
-            best[i] = max(best[i], manipulability_of(J, 0, 6, A))
+            value = manipulability_of(J, 0, 6, A)
+            best[i] = max(best[i], value)
 
 
 @jit

@@ -72,7 +72,7 @@ def _descend_to_targets(
 @jit
 def _sample_streams(key: Words, index: Words) -> Words:
     """The random stream ``(k,)`` of each sample."""
-    streams = np.empty_like(index)
+    streams = np.empty(index.shape[0], dtype=np.uint64)
     for i in range(index.shape[0]):
         streams[i] = hashed(key[0], index[i])
     return streams

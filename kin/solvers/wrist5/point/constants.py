@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import cast
-
-import numpy as np
-
 from kin.tolerances import TOLERANCES
 
 # Constants of a problem, k: lengths of the arm; the target's x, y, h = −z, r = hypot(x, y), azimuth, and K.
@@ -19,5 +15,3 @@ REACH = TOLERANCES.closure_position * 0.1
 SLACK = TOLERANCES.limit
 INSET = TOLERANCES.interval_inset
 AMBIGUOUS = 1e-6  # rad or m; a quantity smaller than this may have either sign, because of rounding
-# Zero as a count. Not a literal: numba compiles a callee again for every literal it is called with.
-ZERO = cast(int, np.int64(0))

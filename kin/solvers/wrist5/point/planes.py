@@ -6,7 +6,7 @@ import math
 
 from kin.angles import TURN, excess
 from kin.kernels.compile import jit
-from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, JOINT, KAY, P0, PC, PR, PT, RAD, ZERO, H, M, S, X, Y
+from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, JOINT, KAY, P0, PC, PR, PT, RAD, H, M, S, X, Y
 from kin.transforms import Array
 
 
@@ -59,7 +59,7 @@ def planes_of(k: Array, low: Array, high: Array, planes: Array) -> int:
     R = 0, with m = ±r, is among them as joint −1.
     """
     a1, a2, d4, d6 = k[A1], k[A2], k[D4], k[D6]
-    count = _add_plane(planes, ZERO, -1.0, 0.0, 0.0, 1.0, 0.0, k[RAD], 0.0)
+    count = _add_plane(planes, 0, -1.0, 0.0, 0.0, 1.0, 0.0, k[RAD], 0.0)
     count = _add_plane(planes, count, -1.0, 0.0, 0.0, 1.0, 0.0, -k[RAD], 0.0)
     for i in range(14):
         joint, t = _angle_of(k, i, low, high)

@@ -14,7 +14,7 @@ from kin.angles import nearest_image
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
-from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, INSET, JOINT, RAD, SHEET, START, ZERO, M
+from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, INSET, JOINT, RAD, SHEET, START, M
 from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest
 from kin.solvers.wrist5.point.newton import move_near
 from kin.solvers.wrist5.point.planes import planes_of
@@ -31,7 +31,7 @@ def _gather(k: Array, spots: Array, box: Array, limits: Array, best: Array, ends
     """
     q = np.empty(5)
     start, stop = window(box[LOW, 3], box[HIGH, 3])
-    count = ZERO
+    count = 0
     for i in range(2 * spots.shape[0]):
         j = i // 2
         sheet = (0 if spots[j, 2] >= 0.0 else 2) + i % 2

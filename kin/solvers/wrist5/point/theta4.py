@@ -9,7 +9,7 @@ import numpy as np
 from kin.angles import excess
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW
-from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, JOINT, KAY, P0, PC, PR, PT, RAD, ZERO, H, M, S
+from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, JOINT, KAY, P0, PC, PR, PT, RAD, H, M, S
 from kin.solvers.wrist5.point.roots import quadratic, real_roots
 from kin.transforms import Array
 
@@ -180,7 +180,7 @@ def find_spots(k: Array, planes: Array, box: Array, spots: Array) -> int:
     """spots ``(n, 3)`` ← (θ4, θ5, R) where the set of feasible θ4 may end; returns their number."""
     roots, levels, level = np.empty(12), np.empty(8), np.zeros(7)
     level[PC] = 1.0
-    count = ZERO
+    count = 0
     for i in range(planes.shape[0]):
         joint = planes[i, JOINT]
         n = _vertical_tangents(k, planes[i], levels) if joint < 4.0 else 0

@@ -10,7 +10,7 @@ from kin.angles import TURN, nearest_image
 from kin.kernels.compile import jit
 from kin.solvers.common import HIGH, LOW
 from kin.solvers.wrist5.point.configuration import branch_at, fits
-from kin.solvers.wrist5.point.constants import BRANCH, D6, END, JOINT, P0, PC, PR, PT, RAD, SHEET, START, ZERO, M
+from kin.solvers.wrist5.point.constants import BRANCH, D6, END, JOINT, P0, PC, PR, PT, RAD, SHEET, START, M
 from kin.solvers.wrist5.point.edges import level_roots, stretched
 from kin.transforms import Array
 
@@ -23,7 +23,7 @@ def _breaks(k: Array, t4: float, planes: Array, start: float, end: float, breaks
     d6, r = k[D6], k[RAD]
     lever, forward = d6 * math.sin(t4), d6 * math.cos(t4)
     breaks[0], breaks[1] = 0.0, math.pi
-    count = ZERO + 2
+    count = 2
     for i in range(planes.shape[0]):
         joint, m = planes[i, JOINT], planes[i, M]
         if joint == 1.0 or joint == 2.0:
@@ -82,12 +82,12 @@ def _add_piece(rows: Array, found: int, branch: int, low: float, high: float, sh
 def theta5_intervals(k: Array, t4: float, planes: Array, box: Array, rows: Array) -> int:
     """rows ``(n, 4)`` ← the feasible θ5 at this θ4, as (branch, start, end, sheet); returns their number."""
     breaks, q = np.empty(256), np.empty(5)
-    found = ZERO
+    found = 0
     start, end = window(box[LOW, 4], box[HIGH, 4])
     count = _into_window(breaks, _breaks(k, t4, planes, start, end, breaks), start, end)
     for sheet in range(4):
         inside = False
-        alone = ZERO - 1
+        alone = -1
         last = math.nan
         for i in range(count):
             t5 = breaks[i]
