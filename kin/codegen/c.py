@@ -3,6 +3,9 @@
 An array is a pointer and its shape, a tuple is a struct; both are passed by value. Every array that a kernel
 makes has a place of constant size on the stack (:mod:`kin.codegen.rooms`), and one that it returns has its place
 with the caller. So there is no heap, no buffer that could overflow and no static state but constants.
+
+A Python extension has a heap, for arrays that are large or whose size does not follow. Each place in the source at
+which one is made has one block, which is taken again in the next round of a loop, and released on return.
 """
 
 from __future__ import annotations
@@ -13,9 +16,9 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from kin.codegen.emit import ADD, ATOM, MULTIPLY, UNARY, Emitter, Text
+from kin.codegen.emit import ATOM, MULTIPLY, UNARY, Emitter, Text
 from kin.codegen.rooms import Rooms
-from kin.codegen.source import OutsideSubsetError, is_inlined
+from kin.codegen.source import ITEMS, OutsideSubsetError, is_inlined
 from kin.codegen.tree import (
     Call,
     Cast,
@@ -38,6 +41,8 @@ from kin.codegen.types import (
     FLOAT,
     INT,
     NONE,
+    SINGLE,
+    WORD,
     ArrayOf,
     Kernel,
     Scalar,
@@ -48,18 +53,35 @@ from kin.codegen.types import (
 from kin.codegen.typing import Program
 
 RUNTIME = (Path(__file__).parent / "runtime.h").read_text(encoding="utf-8")
-_LETTERS = {FLOAT: "f", INT: "i", BOOL: "b", COMPLEX: "z"}
-_ZEROS: dict[Type, str] = {FLOAT: "0.0", INT: "0", BOOL: "false"}
-_NAMES = {FLOAT: "double", INT: "int64_t", BOOL: "bool", COMPLEX: "cplx", NONE: "void"}
+HEAP = """\
+#include <stdlib.h>
+typedef struct { void *p; size_t size; } block; // of all zeros: nothing is taken
+static inline void *taken(block *b, size_t size) {
+  if (b->p == NULL || b->size < size) {
+    free(b->p);
+    b->p = malloc(b->size = size > 0 ? size : 1);
+    if (b->p == NULL) abort();
+  }
+  return b->p;
+}
+static inline void released(block *b, int count) { for (int k = 0; k < count; k++) free(b[k].p); }
+"""
+ON_STACK = 4096  # numbers of an array that is on the stack although there is a heap
+LETTERS = {FLOAT: "f", INT: "i", BOOL: "b", COMPLEX: "z", WORD: "w", SINGLE: "s"}
+_ZEROS: dict[Type, str] = {FLOAT: "0.0", INT: "0", BOOL: "false", WORD: "0", SINGLE: "0"}
+NAMES = {
+    FLOAT: "double", INT: "int64_t", BOOL: "bool", COMPLEX: "cplx", WORD: "uint64_t", SINGLE: "float",
+    NONE: "void",
+}  # fmt: skip
 _TAKEN = (
     "auto break case char const continue default do double else enum extern float for goto if inline int "
     "long register restrict return short signed sizeof static struct switch typedef union unsigned void "
     "volatile while bool true false near far huge small y0 y1 yn j0 j1 jn gamma signgam index div and or "
-    "not xor class new delete this template typename namespace private public protected operator friend "
+    "not xor class new delete this template typename namespace private public protected operator friend block "
     "using try catch throw asm export linux unix w_t NAN INFINITY "
 )
 WORDS = frozenset(_TAKEN.split()).union(
-    re.findall(r"\b(\w+)\(", RUNTIME), (f"{letter}{ndim}" for letter in "fibz" for ndim in range(1, 5))
+    re.findall(r"\b(\w+)\(", RUNTIME + HEAP), (f"{letter}{ndim}" for letter in "fibzws" for ndim in range(1, 5))
 )
 
 
@@ -67,9 +89,9 @@ def mangled(kind: Type) -> str:
     """The name of an array or a tuple, or a letter for a number."""
     match kind:
         case Scalar():
-            return _LETTERS[kind]
+            return LETTERS[kind]
         case ArrayOf(item=item, ndim=ndim):
-            return f"{_LETTERS[item]}{ndim}"
+            return f"{LETTERS[item]}{ndim}"
         case TupleOf(items=items):
             runs = [(each, len(list(group))) for each, group in groupby(map(mangled, items))]
             return "t_" + "_".join(f"{each}x{count}" if count > 1 else each for each, count in runs)
@@ -78,7 +100,7 @@ def mangled(kind: Type) -> str:
 
 def name_of(kind: Type) -> str:
     """The name of a type."""
-    return _NAMES[kind] if isinstance(kind, Scalar) else mangled(kind)
+    return NAMES[kind] if isinstance(kind, Scalar) else mangled(kind)
 
 
 class C(Emitter):
@@ -88,17 +110,23 @@ class C(Emitter):
         super().__init__(made, taken)
         self.rooms, self.kinds = rooms, kinds
         self.storage: list[str] = []
-        self.used = 0  # entries of the room that the caller gives
+        self.releases: list[str] = []
+        self.places: dict[int, str] = {}  # of what is made, by the id of the expression
+        self.used = 0  # of the room that the caller gives
 
     def function(self) -> str:
         """The definition."""
         it = self.made
         self.depth = 0
         self.block(it.body)
+        if self.releases:  # every return releases all blocks, which are known now
+            self.lines.clear()
+            self.block(it.body)
+            self.lines += ["  " + each for each in self.releases if it.result == NONE]
         passed = [(n, k) for n, k in zip(it.parameters, it.kinds, strict=True) if not isinstance(k, Kernel)]
         names = [f"{name_of(kind)} {self.name(name)}" for name, kind in passed]
         if self.returned_kind is not None:
-            names.insert(0, f"{_NAMES[self.returned_kind]} *room")
+            names.insert(0, f"{'block' if self.rooms.heap else NAMES[self.returned_kind]} *room")
         lines = [f"  (void){self.name(name)};" for name, _ in passed if name not in self.read]
         for name, kind in it.variables.items():
             if name not in it.parameters and name in self.read and name not in self.own:
@@ -123,6 +151,8 @@ class C(Emitter):
             return f"cplx_of({value.real!r}, {value.imag!r})", ATOM
         if kind == BOOL:
             return ("true" if value else "false"), ATOM
+        if kind == WORD:
+            return f"{value}u", ATOM
         text = "NAN" if math.isnan(value) else repr(value).replace("inf", "INFINITY")
         return text, UNARY if text.startswith("-") else ATOM
 
@@ -161,38 +191,51 @@ class C(Emitter):
         if isinstance(value, Table):  # as an array: where it is passed on
             shape = map(str, self.shapes[value.name])
             assert isinstance(value.kind, ArrayOf)
-            return self.of(value.kind, f"({_NAMES[value.kind.item]} *){value.name}", shape), ATOM
+            return self.of(value.kind, f"({NAMES[value.kind.item]} *){value.name}", shape), ATOM
         return super().expr(value)
 
     shapes: dict[str, tuple[int, ...]]
 
-    def room(self, node: New | Copy, item: Scalar) -> str:
-        """The place of an array that is made: on the stack, or with the caller if it may be returned."""
-        size = self.rooms.sizes[id(node)]
-        if self.returned_kind is not None:
-            if item != self.returned_kind:
+    def place(self, node: Expr, size: int, item: Scalar, heap: bool) -> str:
+        """The place of what an expression makes: in this kernel, or with the caller if it may be returned."""
+        if id(node) in self.places:
+            return self.places[id(node)]
+        if self.returned_kind is None:
+            place = self.fresh("room")
+            start = f"block {place}[{size}] = {{{{0}}}}" if heap else f"{NAMES[item]} {place}[{size}]"
+            self.storage.append(f"  {start};")
+            self.releases += [f"released({place}, {size});"] if heap else []
+        else:
+            if not heap and item != self.returned_kind:
                 what = "a kernel that returns arrays and makes some of another type"
                 raise OutsideSubsetError(self.made.function, self.made.function, what, "let the caller make them")
+            place = f"room + {self.used}" if self.used else "room"
             self.used += size
-            return f"room + {self.used - size}" if self.used > size else "room"
-        name = self.fresh("room")
-        self.storage.append(f"  {_NAMES[item]} {name}[{size}];")
-        return name
+        self.places[id(node)] = place
+        return place
+
+    def room(self, node: New | Copy, item: Scalar, bytes_: str) -> str:
+        """The place of an array that is made, which takes so many bytes."""
+        size = self.rooms.sizes[id(node)]
+        heap = self.rooms.heap and (size > ON_STACK or self.returned_kind is not None)
+        place = self.place(node, 1 if heap else size, item, heap)
+        return f"({NAMES[item]} *)taken({place}, {bytes_})" if heap else place
 
     def new(self, value: New) -> str:
         assert isinstance(value.kind, ArrayOf)
-        place, item = self.room(value, value.kind.item), value.kind.item
+        item, count = value.kind.item, " * ".join(self.text(each, MULTIPLY) for each in value.shape)
+        place = self.room(value, item, f"sizeof({NAMES[item]}) * (size_t)({count})")
         if value.fill is not None:
-            count = " * ".join(self.text(each, MULTIPLY) for each in value.shape)
-            place = f"filled_{_LETTERS[item]}({place}, {count}, {self.text(value.fill)})"
+            place = f"filled_{LETTERS[item]}({place}, {count}, {self.text(value.fill)})"
         return self.of(value.kind, place, map(self.text, value.shape))
 
     def copied(self, value: Copy) -> str:
         assert isinstance(value.kind, ArrayOf)
         item, array = value.kind.item, self.text(value.array, ATOM)
         sizes = [self.length(value.array, k) for k in range(value.kind.ndim)]
-        size = f"sizeof({_NAMES[item]}) * (size_t)({' * '.join(sizes)})"
-        return self.of(value.kind, f"({_NAMES[item]} *)copied({self.room(value, item)}, {array}.p, {size})", sizes)
+        size = f"sizeof({NAMES[item]}) * (size_t)({' * '.join(sizes)})"
+        place = self.room(value, item, size)
+        return self.of(value.kind, f"({NAMES[item]} *)copied({place}, {array}.p, {size})", sizes)
 
     def reshaped(self, value: Reshaped) -> str:
         return self.of(value.kind, f"{self.text(value.array, ATOM)}.p", map(self.text, value.shape))
@@ -230,12 +273,8 @@ class C(Emitter):
 
     def called(self, value: Call, arguments: list[str]) -> str:
         if (kind := room_of(value.callee)) is not None:
-            if self.returned_kind is not None:
-                what = "a kernel that returns arrays and calls another one that does"
-                raise OutsideSubsetError(self.made.function, self.made.function, what, "let the caller make them")
-            name = self.fresh("room")
-            self.storage.append(f"  {_NAMES[kind]} {name}[{self.rooms.of_result(value.callee)}];")
-            arguments = [name, *arguments]
+            size = self.rooms.of_result(value.callee)
+            arguments = [self.place(value, size, kind, self.rooms.heap), *arguments]
         return f"{value.callee.name}({', '.join(arguments)})"
 
     def stored(self, place: Entry, value: Expr) -> str:
@@ -251,15 +290,28 @@ class C(Emitter):
         return [f"{{ {mangled(kind)} {to} = {self.text(node.place)}; {loop} {to}.p[{k}] = {number}; }}"]
 
     def returned(self, value: Expr | None) -> list[str]:
-        return ["return;" if value is None else f"return {self.text(value)};"]
+        if value is None:
+            return [*self.releases, "return;"]
+        if not self.releases:
+            return [f"return {self.text(value)};"]
+        result = self.fresh("result")
+        return [
+            f"{name_of(self.made.result)} {result} = {self.text(value)};",
+            *self.releases,
+            f"return {result};",
+        ]
 
 
 def room_of(made: Instance) -> Scalar | None:
     """Of what the arrays are that a kernel makes and returns; None if it returns none."""
     if not holds_arrays(made.result):
         return None
-    kinds = [e.kind for e in walk(made.body) if isinstance(e, New | Copy)]
-    return next((kind.item for kind in kinds if isinstance(kind, ArrayOf)), None)
+    for each in walk(made.body):
+        if isinstance(each, New | Copy) and isinstance(each.kind, ArrayOf):
+            return each.kind.item
+        if isinstance(each, Call) and (kind := room_of(each.callee)) is not None:
+            return kind
+    return None
 
 
 def _definitions(kinds: Iterable[Type]) -> list[str]:
@@ -271,7 +323,7 @@ def _definitions(kinds: Iterable[Type]) -> list[str]:
             return
         name = mangled(kind)
         if isinstance(kind, ArrayOf):
-            item, sizes = _NAMES[kind.item], [f"n{k}" for k in range(kind.ndim)]
+            item, sizes = NAMES[kind.item], [f"n{k}" for k in range(kind.ndim)]
             fields = f"{item} *p; int64_t {', '.join(sizes)};"
             given = ", ".join([f"{item} *p", *(f"int64_t {size}" for size in sizes)])
             puts = " ".join(f"x.{each} = {each};" for each in ("p", *sizes))
@@ -301,7 +353,7 @@ def unit(program: Program, rooms: Rooms) -> str:
     tables = []
     for name, value in program.tables.items():
         numbers = ", ".join(map(repr, value.ravel().tolist()))
-        item = _NAMES[_item_of(value.dtype.kind)]
+        item = NAMES[ITEMS[value.dtype.type]]
         tables.append(f"static const {item} {name}[{value.size}] = {{{numbers}}};")
     more = [
         "KINBOARD_INLINE t_fx2 sin_cos(double x) {",
@@ -315,11 +367,5 @@ def unit(program: Program, rooms: Rooms) -> str:
         "}",
         "static inline i1 counted(i1 a) { for (int64_t k = 0; k < a.n0; k++) a.p[k] = k; return a; }",
     ]
-    return "\n".join([RUNTIME, *_definitions(dict.fromkeys(kinds)), *more, *tables, "", *texts, ""])
-
-
-def _item_of(letter: str) -> Scalar:
-    return {"f": FLOAT, "i": INT, "b": BOOL}[letter]
-
-
-__all__ = ["ADD", "C", "unit"]
+    heap = [HEAP] if rooms.heap else []
+    return "\n".join([RUNTIME, *heap, *_definitions(dict.fromkeys(kinds)), *more, *tables, "", *texts, ""])

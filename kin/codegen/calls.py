@@ -10,8 +10,22 @@ import numpy as np
 
 from kin.codegen import source
 from kin.codegen.source import MISSING, PRIMITIVES, Scope
-from kin.codegen.tree import Call, Copy, Expr, Instance, Items, Length, Literal, New, Primitive, Reshaped, View
-from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, ArrayOf, TupleOf, Type, widest
+from kin.codegen.tree import (
+    Call,
+    Cast,
+    Copy,
+    Expr,
+    Instance,
+    Item,
+    Items,
+    Length,
+    Literal,
+    New,
+    Primitive,
+    Reshaped,
+    View,
+)  # fmt: skip
+from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, SINGLE, WORD, ArrayOf, TupleOf, Type, widest
 
 
 class Calls(Scope):
@@ -80,14 +94,17 @@ class Calls(Scope):
                 found = Primitive(kind, "least" if function is min else "most", (found, each))
             return found
         if kind is not None and len(values) == 1:
-            if function is abs and kind != BOOL:
+            if function is abs and kind in (INT, FLOAT, COMPLEX):
                 return Primitive(FLOAT if kind == COMPLEX else kind, "abs", values)
             if function is int and kind != COMPLEX:
                 return Primitive(INT, "whole", values) if kind == FLOAT else self.cast(values[0], INT, node)
-            if function is float and kind != COMPLEX:
+            if function is float and kind in (BOOL, INT, FLOAT):
                 return self.cast(values[0], FLOAT, node)
             if function is bool:
                 return self.truth(node.args[0])
+            to = {np.uint64: (INT, WORD), np.float32: (FLOAT, SINGLE), float: (kind, FLOAT)}.get(function)
+            if to is not None and to[0] == kind:
+                return Cast(to[1], values[0])
         if function is complex and len(values) == 2 and kind in (INT, FLOAT):
             return Primitive(COMPLEX, "complex", tuple(self.cast(value, FLOAT, node) for value in values))
         raise self.refuse(
@@ -120,9 +137,13 @@ class Calls(Scope):
         dtype = self.constant(given["dtype"]) if "dtype" in given else np.float64
         item = source.ITEMS.get(getattr(dtype, "type", dtype))
         if item is None:
-            raise self.refuse(node, "an array of this dtype", "use float64, int64, bool or complex128")
+            raise self.refuse(
+                node, "an array of this dtype", "use float64, int64, uint64, float32, bool or complex128"
+            )
         shape = self.expr(node.args[0])
         sizes = shape.items if isinstance(shape, Items) else (shape,)
+        if not isinstance(shape, Items) and isinstance(shape.kind, TupleOf):
+            sizes = tuple(Item(each, shape, k) for k, each in enumerate(shape.kind.items))
         if any(size.kind not in (INT, BOOL) for size in sizes):
             raise self.refuse(node, "a shape of something else than whole numbers", "write a tuple of them")
         sizes = tuple(self.cast(size, INT, node) for size in sizes)

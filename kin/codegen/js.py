@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from kin.codegen.emit import ATOM, CHOICE, MULTIPLY, UNARY, Emitter, Text
+from kin.codegen.source import OutsideSubsetError
 from kin.codegen.tree import (
     Call,
     Cast,
@@ -30,13 +31,27 @@ from kin.codegen.tree import (
     View,
     walk,
 )  # fmt: skip
-from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, ArrayOf, Kernel, TupleOf, Type, holds_arrays
+from kin.codegen.types import (
+    BOOL,
+    COMPLEX,
+    FLOAT,
+    INT,
+    NONE,
+    SINGLE,
+    WORD,
+    ArrayOf,
+    Kernel,
+    TupleOf,
+    Type,
+    holds_arrays,
+)  # fmt: skip
 from kin.codegen.typing import Program
 
 RUNTIME = (Path(__file__).parent / "runtime.js").read_text(encoding="utf-8")
 _ZEROS: dict[Type, str] = {INT: "0", FLOAT: "0", BOOL: "false"}
 SIZE = 1 << 17  # doubles of the heap
 _MATH = {"isnan": "Number.isNaN", "isfinite": "Number.isFinite", "fabs": "Math.abs", "abs": "Math.abs"}
+_OF_C = ("fused", "bits_of", "float_of")
 _LANGUAGES = frozenset(
     ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "hypot", "atan2", "pow")
 )
@@ -58,6 +73,13 @@ class JavaScript(Emitter):
     def function(self) -> str:
         """The definition."""
         it = self.made
+        for each in walk(it.body):
+            if isinstance(each, Expr) and (
+                getattr(each.kind, "item", each.kind) in (WORD, SINGLE)
+                or (isinstance(each, Primitive) and each.name in _OF_C)
+            ):
+                what = "bits or single precision, which JavaScript does not have"
+                raise OutsideSubsetError(it.function, it.function, what, "use floats")
         self.depth = 0
         self.block(it.body)
         kinds = zip(it.parameters, it.kinds, strict=True)

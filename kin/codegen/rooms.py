@@ -1,8 +1,8 @@
-"""How large every array of a program is at most, so that C needs neither a heap nor a buffer that could overflow.
+"""How large every array of a program is at most, so that C needs no buffer that could overflow.
 
 The arrays that an entry is called with have known shapes. From them follow the shapes of all views and the numbers
 in all shapes, kernel by kernel: upper bounds, since a slice may show less. An array whose size does not follow is
-refused.
+refused, or is on the heap.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from kin.codegen.types import INT, ArrayOf, TupleOf, Type, holds_arrays
 # Of a whole number its largest value, of an array and of a tuple those of its axes and items; None: not known.
 Bound = Any
 _PASSES = 6
+UNKNOWN = 1 << 62  # more than any size
 
 
 class Rooms:
@@ -46,10 +47,11 @@ class Rooms:
 
     Args:
         known: bounds of variables that do not follow, by the names of kernel and variable.
+        heap: whether there is a heap, for arrays whose size does not follow and for those that kernels return.
     """
 
-    def __init__(self, known: Mapping[tuple[str, str], int]) -> None:
-        self.known = known
+    def __init__(self, known: Mapping[tuple[str, str], int], heap: bool = False) -> None:
+        self.known, self.heap = known, heap
         self.sizes: dict[int, int] = {}  # by the id of a `New` or `Copy`
         self._results: dict[tuple[Instance, Bound], Bound] = {}
 
@@ -61,10 +63,14 @@ class Rooms:
         return self._results[key]
 
     def of_result(self, made: Instance) -> int:
-        """How many entries the arrays have that a kernel makes and returns, with those of what it calls."""
+        """How many entries the arrays have that a kernel makes and returns, with those of what it calls.
+
+        With a heap, how many arrays.
+        """
         sites = [e for e in walk(made.body) if isinstance(e, New | Copy)]
         calls = [e for e in walk(made.body) if isinstance(e, Call) and holds_arrays(e.kind)]
-        return sum(self.sizes[id(e)] for e in sites) + sum(self.of_result(e.callee) for e in calls)
+        own = len(sites) if self.heap else sum(self.sizes[id(e)] for e in sites)
+        return own + sum(self.of_result(e.callee) for e in calls)
 
 
 class _Following:
@@ -87,7 +93,7 @@ class _Following:
             if self.bounds == before:
                 break
             if settling > 2:  # what still grows has no bound
-                self.bounds |= {k: _unknown(self.made.variables[k]) for k in before if before[k] != self.bounds[k]}
+                self.bounds |= {k: unknown(self.made.variables[k]) for k in before if before[k] != self.bounds[k]}
         result = None
         for node in walk(self.made.body):
             if isinstance(node, New | Copy):
@@ -105,6 +111,9 @@ class _Following:
 
     def _measure(self, node: New | Copy) -> None:
         shape = self.of(node)
+        if None in shape and self.rooms.heap:
+            self.rooms.sizes[id(node)] = UNKNOWN
+            return
         if None in shape:
             what = "an array whose size does not follow from the arguments"
             raise OutsideSubsetError(self.made.function, self.made.function, what, "give it a constant shape")
@@ -116,7 +125,7 @@ class _Following:
             case Literal(value=number):
                 return number if isinstance(number, int) else None
             case Variable(kind=kind, name=name):
-                return self.bounds.get(name, _unknown(kind))
+                return self.bounds.get(name, unknown(kind))
             case Length(array=array, axis=axis):
                 return self.of(array)[axis]
             case Items(items=items):
@@ -138,7 +147,7 @@ class _Following:
                 return min(known, default=None)
             case Operation(kind=kind, symbol=symbol, a=a, b=b) if kind == INT:
                 return _computed(symbol, self.of(a), self.of(b), b)
-        return _unknown(value.kind)
+        return unknown(value.kind)
 
 
 def _computed(symbol: str, a: Bound, b: Bound, second: Expr) -> Bound:
@@ -156,7 +165,8 @@ def _largest(a: Bound, b: Bound) -> Bound:
     return None if a is None or b is None else max(a, b)
 
 
-def _unknown(kind: Type) -> Bound:
+def unknown(kind: Type) -> Bound:
+    """The bound of a value that nothing is known of."""
     if isinstance(kind, ArrayOf):
         return (None,) * kind.ndim
-    return tuple(map(_unknown, kind.items)) if isinstance(kind, TupleOf) else None
+    return tuple(map(unknown, kind.items)) if isinstance(kind, TupleOf) else None

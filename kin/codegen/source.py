@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, Constants, Scalar, TupleOf, Type
+from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, SINGLE, WORD, Constants, Scalar, TupleOf, Type
 from kin.kernels import simd
 from kin.kernels.compile import inlined, joined
 
 MISSING = object()
-_INLINED = (inlined.__name__, joined.__name__)
+_INLINED = {inlined.__name__, joined.__name__}
 
 
 class OutsideSubsetError(Exception):
@@ -59,10 +59,13 @@ PRIMITIVES: Mapping[Any, tuple[str, tuple[Scalar, ...], Type]] = {
     # Their polynomials read the bits of a float, which JavaScript cannot: it has its own functions.
     plain(simd.sin_cos): ("sin_cos", (FLOAT,), TupleOf((FLOAT, FLOAT))),
     plain(simd.atan2): ("arctan2", (FLOAT, FLOAT), FLOAT),
+    simd.fma: ("fused", (FLOAT, FLOAT, FLOAT), FLOAT),
+    simd.bits_of: ("bits_of", (FLOAT,), INT),
+    simd.float_of: ("float_of", (INT,), FLOAT),
 }
 ALLOCATIONS: dict[Any, float | None] = {np.empty: None, np.zeros: 0.0, np.ones: 1.0, np.full: math.nan}
 ITEMS = {np.float64: FLOAT, float: FLOAT, np.int64: INT, np.intp: INT, int: INT, np.bool_: BOOL, bool: BOOL}
-ITEMS[np.complex128] = ITEMS[complex] = COMPLEX
+ITEMS |= {np.complex128: COMPLEX, complex: COMPLEX, np.uint64: WORD, np.float32: SINGLE}
 _FOLDED: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow, ast.LShift: operator.lshift,
@@ -78,9 +81,14 @@ def tree_of(function: FunctionType) -> ast.FunctionDef:
     return tree
 
 
+def decorators(function: FunctionType) -> set[str]:
+    """The names of the decorators of a kernel."""
+    return {each.id for each in tree_of(function).decorator_list if isinstance(each, ast.Name)}
+
+
 def is_inlined(function: FunctionType) -> bool:
     """Whether numba compiles a kernel into its callers, so that their loops are vectorised."""
-    return any(isinstance(each, ast.Name) and each.id in _INLINED for each in tree_of(function).decorator_list)
+    return bool(decorators(function) & _INLINED)
 
 
 class Scope:

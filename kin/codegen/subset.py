@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
+from functools import reduce
+from typing import Any
 
 from kin.codegen.source import OutsideSubsetError
 from kin.codegen.tree import (
@@ -24,6 +26,7 @@ from kin.codegen.tree import (
     Instance,
     Item,
     Items,
+    Length,
     New,
     Operation,
     Primitive,
@@ -37,7 +40,11 @@ from kin.codegen.tree import (
     parts,
     walk,
 )  # fmt: skip
-from kin.codegen.types import ArrayOf, holds_arrays
+from kin.codegen.types import ArrayOf, TupleOf, Type, holds_arrays
+
+# Of an array, which arguments or variables its memory may be that of: names, with the indices of items of tuples.
+# Of a tuple those of its items.
+Memory = Any
 
 _STATEMENTS: dict[type[ast.stmt], tuple[str, str]] = {
     ast.For: ("the else of a loop", "set a variable and test it behind the loop"),
@@ -80,15 +87,15 @@ def expression(node: ast.expr) -> tuple[str, str]:
 def check(made: Instance) -> None:
     """Note which parameters a kernel writes to, and refuse what depends on an order or on a round of a loop."""
     roots = _roots(made)
-    written: set[str] = set()
+    written: set[tuple[Any, ...]] = set()
     for node in walk(made.body):
         if isinstance(node, Store | Fill):
             written |= _origins(node.place, roots)
         elif isinstance(node, Call):
-            for name, argument in zip(node.callee.parameters, node.arguments, strict=True):
-                if name in node.callee.written:
-                    written |= _origins(argument, roots)
-    made.written = frozenset(written & set(made.parameters))
+            arguments = dict(zip(node.callee.parameters, node.arguments, strict=True))
+            for name, *items in node.callee.written:
+                written |= _flat(reduce(lambda memory, k: memory[k], items, _memory(arguments[name], roots)))
+    made.written = frozenset(path for path in written if path[0] in made.parameters)
     _check_whole(made, roots)
     for each in walk(made.body):
         if isinstance(each, Statement):
@@ -97,28 +104,69 @@ def check(made: Instance) -> None:
             _check_rounds(made, each)
 
 
-def _roots(made: Instance) -> dict[str, set[str]]:
-    """The variables whose memory each variable may show."""
-    roots = {name: {name} for name in made.variables}
+def _roots(made: Instance) -> dict[str, Memory]:
+    """The memory that each variable may show."""
+    roots = {name: _named(kind, (name,)) for name, kind in made.variables.items()}
     for _ in range(3):  # views of views
         for node in walk(made.body):
             if isinstance(node, Assign) and holds_arrays(made.variables[node.name]):
-                roots[node.name] |= _origins(node.value, roots)
+                roots[node.name] = _either(roots[node.name], _memory(node.value, roots))
     return roots
 
 
-def _origins(value: Expr, roots: dict[str, set[str]]) -> set[str]:
-    found = [e.name for e in walk(value) if isinstance(e, Variable) and holds_arrays(e.kind)]
-    return {origin for name in found for origin in roots[name]}
+def _named(kind: Type, path: tuple[Any, ...]) -> Memory:
+    if isinstance(kind, TupleOf):
+        return tuple(_named(each, (*path, k)) for k, each in enumerate(kind.items))
+    return {path} if isinstance(kind, ArrayOf) else set()
 
 
-def _check_whole(made: Instance, roots: dict[str, set[str]]) -> None:
+def _spread(kind: Type, origins: set[tuple[Any, ...]]) -> Memory:
+    """Of a value that may show any of these."""
+    if isinstance(kind, TupleOf):
+        return tuple(_spread(each, origins) for each in kind.items)
+    return origins if isinstance(kind, ArrayOf) else set()
+
+
+def _either(a: Memory, b: Memory) -> Memory:
+    return tuple(map(_either, a, b)) if isinstance(a, tuple) else a | b
+
+
+def _flat(memory: Memory) -> set[tuple[Any, ...]]:
+    return set().union(*map(_flat, memory)) if isinstance(memory, tuple) else memory
+
+
+def _memory(value: Expr, roots: dict[str, Memory]) -> Memory:
+    match value:
+        case Variable(name=name):
+            return roots[name]
+        case Items(items=items):
+            return tuple(_memory(item, roots) for item in items)
+        case Item(base=base, index=index):
+            items = _memory(base, roots)
+            return items[index] if isinstance(index, int) else reduce(_either, items)
+        case New() | Copy() | Length():
+            return set()
+    inner = [_flat(_memory(part, roots)) for part in parts(value) if isinstance(part, Expr)]
+    return _spread(value.kind, set().union(*inner))
+
+
+def _origins(value: Expr, roots: dict[str, Memory]) -> set[tuple[Any, ...]]:
+    """Which arguments or variables the memory is of that a value shows, or a place that is stored to."""
+    return _flat(_memory(value.array if isinstance(value, Entry) else value, roots))
+
+
+def _check_whole(made: Instance, roots: dict[str, Memory]) -> None:
     """Refuse arithmetic of whole arrays that share memory with what it is stored in.
 
     Python computes all of ``a, b = x + y, x − y`` before it stores anything.
     """
     fills = [node for node in walk(made.body) if isinstance(node, Fill) and isinstance(node.value.kind, ArrayOf)]
     made.apart = bool(fills)
+    stored = {id(each) for node in fills for each in _summands(node.value)}
+    for node in walk(made.body):
+        if isinstance(node, Operation) and isinstance(node.kind, ArrayOf) and id(node) not in stored:
+            what = "arithmetic of arrays that is not stored"
+            raise OutsideSubsetError(made.function, made.function, what, "write a loop over the entries")
     for a in fills:
         for b in fills:
             if a.node is b.node and _origins(a.place, roots) & _origins(b.value, roots):
@@ -131,6 +179,13 @@ def _check_whole(made: Instance, roots: dict[str, set[str]]) -> None:
             if sum(map(len, origins)) != len(set().union(*origins)):
                 what = "one array passed twice to a kernel that computes with whole arrays"
                 raise OutsideSubsetError(made.function, made.function, what, "copy it before")
+
+
+def _summands(value: Expr) -> Iterator[Expr]:
+    """Arithmetic of arrays that is computed number by number."""
+    yield value
+    if isinstance(value, Operation):
+        yield from (*_summands(value.a), *_summands(value.b))
 
 
 def _expressions(statement: Statement) -> tuple[Expr, ...]:
@@ -195,21 +250,41 @@ def _shown(value: Expr) -> Iterator[str]:
                 yield from _shown(item)
 
 
+def _makes(node: object) -> bool:
+    """Whether a node makes an array, or calls what makes one and returns it."""
+    if isinstance(node, Call):
+        return holds_arrays(node.kind) and any(map(_makes, walk(node.callee.body)))
+    return isinstance(node, New | Copy)
+
+
 def _check_rounds(made: Instance, loop: For | While) -> None:
-    """Refuse an array of one round of a loop under a second name, which might still be read in the next round."""
-    inside = [node for node in walk(loop.body) if isinstance(node, Assign)]
-    makes = [node for node in inside if any(isinstance(each, New | Copy) for each in walk(node.value))]
-    fresh = {node.name for node in makes if isinstance(node.value.kind, ArrayOf)}
+    """Refuse an array of one round of a loop under a second name, which might still be read in the next round.
+
+    Also one of the last round that is an argument of the call that makes it anew.
+    """
+    inside = [node for node in walk(loop.body) if isinstance(node, Assign) and holds_arrays(node.value.kind)]
     names = [node.name for node in inside]
+    fresh: dict[str, set[int]] = {}  # arrays that are made in the loop → where
+    for place, node in enumerate(inside):
+        if any(map(_makes, walk(node.value))):
+            fresh.setdefault(node.name, set()).add(place)
     for node in inside:
-        if any(name in fresh for name in _shown(node.value)) and not isinstance(node.value, View | Reshaped):
+        shown = [name for name in _shown(node.value) if name in fresh]
+        if shown and isinstance(node.value, Item) and names.count(node.name) == 1:
+            fresh[node.name] = fresh[shown[0]]
+        elif shown and not isinstance(node.value, View | Reshaped):
             what = "an array that is made in a loop, under a second name"
             raise OutsideSubsetError(
                 made.function, node.node, what, "make it before the loop, or copy its entries"
             )
+    for place, node in enumerate(inside):
+        passed = [name for e in walk(node.value) if isinstance(e, Call) for a in e.arguments for name in _shown(a)]
+        if any(place in fresh.get(name, ()) for name in passed):
+            what = "an array that a call makes in a loop, passed to it in the next round"
+            raise OutsideSubsetError(made.function, node.node, what, "copy its entries into another one")
         if (
             isinstance(node.value, View | Reshaped)
-            and set(_shown(node.value)) & fresh
+            and any(name in fresh for name in _shown(node.value))
             and names.count(node.name) > 1
         ):
             what = "a view that is assigned more than once in a loop, of an array made in it"

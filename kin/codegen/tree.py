@@ -242,7 +242,7 @@ class Instance:
     """A kernel with the types of its arguments.
 
     Attributes:
-        written: the parameters that show memory it writes to.
+        written: the arrays it writes to: the parameter, then the indices of items of tuples.
         apart: whether its arrays must not share memory, since it computes with whole arrays.
     """
 
@@ -254,7 +254,7 @@ class Instance:
     result: Type = NONE
     body: tuple[Statement, ...] = ()
     note: str = ""
-    written: frozenset[str] = frozenset()
+    written: frozenset[tuple[Any, ...]] = frozenset()
     apart: bool = False
 
 

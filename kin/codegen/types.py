@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Scalar:
-    """A number; `rank` orders what Python promotes: bool → int → float → complex."""
+    """A number; `rank` orders what Python promotes: bool → int → float → complex, single → float."""
 
     name: str
     rank: int
@@ -17,6 +17,7 @@ class Scalar:
 
 BOOL, INT, FLOAT, COMPLEX = (Scalar(name, k) for k, name in enumerate(("bool", "int", "float", "complex")))
 NONE = Scalar("none", -1)
+WORD, SINGLE = Scalar("word", 1), Scalar("single", 1)  # 64 bits without a sign, and single precision
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,10 @@ Type = Scalar | ArrayOf | TupleOf | Kernel
 def widest(*kinds: Type) -> Scalar | None:
     """The number that these are promoted to, None if one of them is none."""
     numbers = [kind for kind in kinds if isinstance(kind, Scalar) and kind != NONE]
-    return max(numbers, key=lambda kind: kind.rank) if len(numbers) == len(kinds) else None
+    apart = [kind for kind in (WORD, SINGLE) if kind in numbers and set(numbers) - {kind, FLOAT}]
+    if len(numbers) < len(kinds) or apart or {WORD, FLOAT} <= set(numbers):
+        return None
+    return max(numbers, key=lambda kind: kind.rank)
 
 
 def joined(a: Type, b: Type) -> Type | None:

@@ -52,6 +52,8 @@ from kin.codegen.types import (
     FLOAT,
     INT,
     NONE,
+    SINGLE,
+    WORD,
     ArrayOf,
     Constants,
     Kernel,
@@ -401,6 +403,8 @@ class _Builder(Calls):
                 return Literal(FLOAT, value)
             case complex():
                 return Literal(COMPLEX, value)
+            case np.uint64():
+                return Literal(WORD, int(value))
             case tuple():
                 items = tuple(self.known(node, item) for item in value)
                 names = getattr(value, "_fields", ())
@@ -428,7 +432,9 @@ class _Builder(Calls):
         kind, symbol = widest(a.kind, b.kind), _SYMBOLS.get(op, "")
         if kind is None:
             return self.of_arrays(node, symbol, a, b)
-        if symbol in ("&", "|", "^") and a.kind == b.kind and kind in (BOOL, INT):
+        if symbol in ("&", "|", "^") and a.kind == b.kind and kind in (BOOL, INT, WORD):
+            return Operation(kind, symbol, a, b)
+        if kind == WORD and symbol in ("+", "-", "*", ">>"):
             return Operation(kind, symbol, a, b)
         kind = kind if kind.rank > BOOL.rank else INT
         if op is ast.Pow:
@@ -436,7 +442,7 @@ class _Builder(Calls):
         if symbol == "/" and kind == INT:
             kind = FLOAT
         allowed = symbol in ("+", "-", "*", "/") or (symbol in ("//", "%") and kind != COMPLEX)
-        if not allowed and not (symbol in ("<<", ">>") and kind == INT):
+        if kind in (WORD, SINGLE) or (not allowed and not (symbol in ("<<", ">>") and kind == INT)):
             raise self.refuse(node, f"this operator between {a.kind} and {b.kind}", "write + − × ÷, // or %")
         return Operation(kind, symbol, self.cast(a, kind, node), self.cast(b, kind, node))
 

@@ -12,6 +12,7 @@ import numpy as np
 
 MASKS = np.array([1.0, 2.0, 4.0])
 WORD, NUMBERS = "text", [1, 2, 3]
+GAMMA, ELEVEN = np.uint64(0x9E3779B97F4A7C15), np.uint64(11)
 
 
 class Pair(NamedTuple):
@@ -38,6 +39,11 @@ def fresh(a):
     for i in range(a.shape[0]):
         b[i] = 2.0 * a[i]
     return b
+
+
+def with_length(a):
+    b = fresh(a)
+    return b, b.shape[0]
 
 
 def recursive(x):
@@ -122,6 +128,10 @@ def array_augmented(x, y, a):
 def array_named(x, y, a):
     b = a + a
     return b[1]
+
+
+def array_passed(x, y, a):
+    return read(x * a)
 
 
 def overlapping(x, y, a):
@@ -284,6 +294,34 @@ def fancy_index(x, y, a):
     return a[a > 1.0][0]
 
 
+def words_and_numbers(x, y, a):
+    return float(int(x) + np.uint64(int(y)))
+
+
+def divided_words(x, y, a):
+    return float(np.uint64(int(x)) // GAMMA)
+
+
+def singles_added(x, y, a):
+    return float(np.float32(x) + np.float32(y))
+
+
+def passed_again(x, y, a):
+    b = fresh(a)
+    for i in range(2):
+        b = fresh(b)
+    return b[0]
+
+
+def pair_under_a_second_name(x, y, a):
+    last = a
+    for i in range(2):
+        x += last[0]
+        b, n = with_length(a)
+        last = b
+    return x
+
+
 def column(x, y, a):
     return a.reshape(2, 2)[:, 1][0]
 
@@ -343,7 +381,7 @@ REFUSED = {
     invert: "~ or unary +", unary_plus: "~ or unary +", while_else: "the else of a loop", for_else: "the else of a loop",
     flag_equals_number: "a comparison of", or_of_numbers: "and / or", and_of_numbers: "and / or",
     stepped_view: "a slice with a step", arrays_side_by_side: "arithmetic of arrays stored in one of them",
-    array_augmented: "changed as a whole", array_named: "arithmetic of arrays", overlapping: "stored in one of them",
+    array_augmented: "changed as a whole", array_named: "arithmetic of arrays", array_passed: "arithmetic of arrays", overlapping: "stored in one of them",
     overlapping_copy: "stored in one of them", augmented_by_a_writer: "a call that writes",
     reads_around_a_writer: "a call that writes", two_writers: "a call that writes", writer_in_an_index: "a call that writes",
     array_kept_over_rounds: "under a second name", recursion: "calls itself", default_left_out: "other arguments",
@@ -356,6 +394,8 @@ REFUSED = {
     two_types: "one variable of two types", step_unknown: "a step that is no constant", builtin_round: "neither a kernel",
     mixed_tuple_index: "an index of a tuple of several types", negative_power: "a power", integer_power: "a power",
     float_index: "a whole number is needed", order_of_complex: "an order of", large_number: "beyond 2",
+    words_and_numbers: "arithmetic of", divided_words: "this operator", singles_added: "this operator",
+    passed_again: "passed to it in the next round", pair_under_a_second_name: "under a second name",
 }  # fmt: skip
 
 
@@ -543,6 +583,15 @@ def writers_in_order(x, y, a):
     return n + a[0]
 
 
+def arrays_of_calls(x, y, a):
+    total = 0.0
+    for i in range(3):
+        b, n = with_length(a)
+        c = fresh(b)
+        total += c[i] + float(n)
+    return total
+
+
 def library(x, y, a):
     return math.sqrt(abs(x)) + math.floor(-x) + math.ceil(y) + math.fabs(x) + math.pi
 
@@ -551,8 +600,28 @@ RIGHT = (
     negative_index, floor_large, zero_of_whole_numbers, shift, powers, quotients, least_and_most, rounded, both_conditions,
     loop_variable, range_that_changes, slices, conditions, chosen, truth_in_sums, tables, signs_and_brackets,
     bits_of_words, complex_numbers, arrays_of_all_kinds, swapped, arrays_swapped, chained, named_tuple,
-    returned_array, passed_kernel, whole_arrays, nested_calls, library, writers_in_order,
+    returned_array, passed_kernel, whole_arrays, nested_calls, library, writers_in_order, arrays_of_calls,
 )  # fmt: skip
+
+
+# ---- what is right in C alone ----
+
+
+def words(x, y, a):
+    w = np.empty(2, dtype=np.uint64)
+    w[0] = (np.uint64(int(abs(x)) + 3) * GAMMA) ^ (GAMMA >> ELEVEN)
+    w[1] = (w[0] | GAMMA) & (w[0] - GAMMA)
+    return float(w[0] >> ELEVEN) + (1.0 if w[0] < w[1] else 0.5) * float(w[1])
+
+
+def singles(x, y, a):
+    s = np.empty(2, dtype=np.float32)
+    s[0] = np.float32(x / 3.0)
+    s[1] = s[0]
+    return float(s[1])
+
+
+RIGHT_IN_C = words, singles
 for each in list(globals().values()):
     if callable(each) and getattr(each, "__module__", "") == __name__ and not isinstance(each, type):
         each.__module__ = "kin.constructs"  # only kernels of the core are translated
