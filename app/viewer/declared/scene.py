@@ -238,7 +238,7 @@ class SceneView:
         if not one.held:
             assign(one.handle, node.position, node.wxyz)
 
-    def _listen(self, handle: viser.TransformControlsHandle, one: _Shown, event: tuple[Hashable, ...]) -> None:
+    def _listen(self, handle: Any, one: _Shown, event: tuple[Hashable, ...]) -> None:
         keep_private(handle)
 
         def post(key: Hashable, pull: object) -> None:

@@ -95,7 +95,7 @@ class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
             found.append(Lazy(str(i), nodes.nodes, args))
         if chosen is not None:
             T = placed.pose(f.items[chosen])
-            found.append(nodes.gizmo(T, radius, self.event(self.on_drag)))
+            found.append(nodes.gizmo(T, radius, ("on_drag",)))
             if s.grabbed is not None:
                 found.append(nodes.travel(travel(s.grabbed, T, self.stage.units), T, radius))
         return found

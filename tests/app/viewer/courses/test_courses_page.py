@@ -378,7 +378,7 @@ def test_a_link_with_an_unknown_exercise_says_so(server: int) -> None:
         tab.wait(lambda: bool(block(tab, "choose")))
         press(tab, "course", ["go", 1], 99)
         press(tab, "course", ["upload", 2], 7)
-        tab.wait(lambda: "a control of the course" in shown(tab))
+        tab.wait(lambda: "the name and the text of a file" in shown(tab))
 
 
 def test_courses_that_nobody_opens_make_no_database(tmp_path: Path) -> None:
