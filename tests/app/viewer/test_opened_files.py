@@ -9,7 +9,7 @@ import pytest
 
 from app.viewer.live.feature import OPENED, Connect
 from app.viewer.meshes.archive import MOST_BYTES
-from app.viewer.tabs.program import files as programs
+from app.viewer.tabs.program import program as programs
 from app.viewer.tabs.program.tab import ProgramTab
 from app.viewer.tabs.robot import files as arms
 from app.viewer.tabs.robot.motors import feature as motors
