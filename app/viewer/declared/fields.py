@@ -20,11 +20,13 @@ from typing import Any, Literal, Self, TypeGuard
 
 from app.viewer.panel.fields import limit_marks
 from kin import InputError, Robot
+from kin.typed import EntryError, ReadError, cut, read
 from kin.units import Unit, Units
 
 Options = Mapping[str, object]
-Measure = Literal["", "length", "angle"]
-_NONE = Unit("", 1.0, 0)
+Measure = Literal["", "length", "angle", "s", "%"]
+_NONE, _SECONDS, _PERCENT = Unit("", 1.0, 0), Unit("s", 1.0, 3), Unit("%", 100.0, 0)
+_DECIMALS = 6  # of a degree or a millimetre, in a field of a form
 LONGEST = 100  # characters of a text in a link
 
 
@@ -160,6 +162,8 @@ class Choice(Spec):
 class Number(Spec):
     """A number within limits (radians, metres, or as it is) in a field or a slider; `clip`: limits cut it.
 
+    Forms of our own HTML show it as a `cell`, and read what is `typed` into it.
+
     Controls show its unit if it has a `measure`, otherwise `scale` of it, with `digits`; a step of the control is
     `step`, or one of the last digit.
 
@@ -169,6 +173,9 @@ class Number(Spec):
         within: the limits for a robot, and the ends of its slider, if they are not the same for all.
         marks: whether the ends below the slider are written by us: viser writes a hyphen for a minus.
         named: whether the label ends with the unit.
+        rate: in a form, whether it is per second.
+        above: in a form, whether the lower limit itself is not valid.
+        empty, nothing: what an empty field of a form means, and its value; "": it must not be empty.
     """
 
     limits: tuple[float, float] = (-math.inf, math.inf)
@@ -182,6 +189,10 @@ class Number(Spec):
     whole: bool = False
     marks: bool = False
     named: bool = True
+    rate: bool = False
+    above: bool = False
+    empty: str = ""
+    nothing: float | None = None
     within: Callable[[Robot], tuple[float, float]] | None = None
 
     def of(self, robot: Robot) -> Number:
@@ -197,7 +208,8 @@ class Number(Spec):
         return "slider" if self.slider else "number"
 
     def unit(self, units: Units) -> Unit | None:
-        return {"length": units.lengths, "angle": units.angles, "": None}[self.measure]
+        own = {"length": units.lengths, "angle": units.angles, "s": _SECONDS, "%": _PERCENT, "": None}
+        return own[self.measure]
 
     def shown(self, value: Any, robot: Robot, units: Units) -> Any:
         if (slider := self.of(robot).slider) is not None:
@@ -240,6 +252,36 @@ class Number(Spec):
         if (self.whole and entry != entry // 1) or (not self.clip and not low <= entry <= high):
             raise InputError(name, entry, expected)
         return int(entry) if self.whole else min(max(float(entry), low), high)
+
+    def cell(self, name: str, value: float | None, units: Units, wrong: str | None = None) -> dict[str, object]:
+        """The field of a form, for the macro *number* of the templates; `wrong`: a text that was refused."""
+        unit = self._unit(units)
+        shown = "" if value is None or (self.empty and value == self.nothing) else unit.short(value, _DECIMALS)
+        return {
+            "name": name,
+            "spec": self,
+            "value": shown if wrong is None else wrong,
+            "unit": unit.name + "/s" * self.rate,
+            "wrong": wrong is not None,
+        }
+
+    def typed(self, text: str, units: Units) -> float | None:
+        """The value of a text in a form; raises `EntryError`, which says what would be valid."""
+        unit, title, (low, high) = self._unit(units), "The field stays as it was", self.limits
+        given = text.replace("/s", "") if self.rate else text
+        if self.empty and not given.strip():
+            return self.nothing
+        first, last = unit.short(low), unit.short(high)
+        valid = f"above {first}, at most {last}" if self.above else f"{first} to {last}"
+        valid += unit.suffix.rstrip() + "/s" * self.rate + f", or nothing: {self.empty}" * bool(self.empty)
+        valid = "a whole number from " * self.whole + valid
+        try:
+            value = read(given, unit, self.limits)
+        except ReadError as error:
+            raise EntryError(title, f"{error.sentence} Valid: {valid}.", error.readings) from None
+        if low <= value <= high and not (self.above and value == low) and not (self.whole and value % 1.0):
+            return int(value) if self.whole else value
+        raise EntryError(title, f"“{cut(text)}” is not valid. Valid: {valid}.")
 
     def _unit(self, units: Units) -> Unit:
         return self.unit(units) or (_NONE if self.scale == 1.0 else Unit("", self.scale, 0))

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 import kin
+from app.viewer.declared.fields import Measure, Number
 from app.viewer.own_arm import clean
-from app.viewer.panel.entry import NumberField
 from app.viewer.scene.meshes import body
 from kin import InputError, Obstacle, Robot
 from kin.collision.obstacles import KINDS, LARGEST, MOST_OBSTACLES, SMALLEST, Shape
@@ -151,17 +151,19 @@ def removed(items: Obstacles, index: int) -> Obstacles:
     return (*items[:index], *items[index + 1 :])
 
 
-def fields_of(each: Obstacle) -> list[tuple[str, dict[str, tuple[NumberField, float]]]]:
+def fields_of(each: Obstacle) -> list[tuple[str, dict[str, tuple[Number, float]]]]:
     """The numbers of an obstacle, by groups, as its kind has them: how each is typed, and its value (m, rad)."""
     place = "Middle of the top" if each.kind.topped else "Centre"
+    found: list[tuple[str, Sequence[str], Sequence[float], tuple[float, float], Measure]]
     found = [(place, PLACE, each.xyz, (-FARTHEST, FARTHEST), "length")]
     if each.kind.solid != SPHERE:
         found.append(("Rotation", TURN, each.rpy, (-MOST_TURN, MOST_TURN), "angle"))
     found.append(("Size", each.kind.names, each.sizes, (SMALLEST, LARGEST), "length"))
-    return [
-        (title, {name: (NumberField(name, *ends, unit), value) for name, value in zip(names, values, strict=True)})
-        for title, names, values, ends, unit in found
-    ]
+    groups = []
+    for title, names, values, ends, measure in found:
+        specs = [Number(label=name, limits=ends, measure=measure) for name in names]
+        groups.append((title, dict(zip(names, zip(specs, values, strict=True), strict=True))))
+    return groups
 
 
 def typed(items: Obstacles, index: int, field: str, text: str, units: Units) -> Obstacles:
@@ -175,7 +177,7 @@ def typed(items: Obstacles, index: int, field: str, text: str, units: Units) -> 
     known = {name: one for _, group in fields_of(each) for name, (one, _) in group.items()}
     if field not in known:
         raise InputError("field", field, "one of " + ", ".join(known))
-    value = known[field].read(text, units)
+    value = known[field].typed(text, units)
     assert value is not None
     if field in PLACE:
         new = replace(each, xyz=_with(each.xyz, PLACE.index(field), value))

@@ -8,14 +8,16 @@ from functools import cached_property, lru_cache
 
 from app.exports.motion_snippets import SNIPPETS
 from app.viewer.declared.facts import Facts
-from app.viewer.declared.fields import Settings, choice, flag, memory
+from app.viewer.declared.fields import Settings, choice, flag, memory, number
 from app.viewer.own_arm import KEY
 from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion
 from app.viewer.tabs.program.plan import Asked, Fault, Plan, find_fault, plan
 from app.viewer.tabs.program.program import Segments, fits, places, targets
-from app.viewer.tabs.program.ways import USUAL
+from app.viewer.tabs.program.typed import FARTHEST
+from app.viewer.tabs.program.ways import LONGEST, SEED_HINT, SHORTEST, USUAL
 from kin.motion import Motion, Program
 from kin.transforms import Array
+from kin.way import MOST_SEED
 
 RATES = {f"{rate:g}×": rate for rate in (0.1, 0.25, 0.5, 1.0, 2.0)}  # of the real speed
 LANGUAGES = {name: name for name in SNIPPETS}
@@ -56,13 +58,13 @@ class ProgramSettings(Settings):
     point: int = memory(0)
     by_pose: bool = memory(False, renew=False)
     joint: int | None = memory()
-    zone: float = memory(ZONE, renew=False)
+    zone: float = number("Radius", ZONE, (0.0, FARTHEST), "length", empty="the arm stops", nothing=0.0, link=False)
     revision: int = memory(0, renew=False)
     chart: Asked | None = memory()
     way: Asked | None = memory()
     search: int = memory(0)
-    seconds: float = memory(USUAL, renew=False)
-    seed: int = memory(0, renew=False)
+    seconds: float = number("Time limit", USUAL, (SHORTEST, LONGEST), "s", link=False)
+    seed: int = number("Seed", 0, (0, MOST_SEED), hint=SEED_HINT, whole=True, link=False)
     limits: tuple[float, int] = memory((USUAL, 0), renew=False)
     time: float = memory(0.0)
     playing: bool = memory(False)

@@ -17,6 +17,7 @@ import numpy as np
 
 import kin
 import kin.way
+from app.exports.motion import FORMATS
 from app.exports.program_toml import toml_of
 from app.exports.snippets import named
 from app.viewer.declared.feature import DeclaredFeature
@@ -29,12 +30,11 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.program import postures, scene, views, ways
 from app.viewer.tabs.program import program as rows
-from app.viewer.tabs.program.files import motion_file
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.plot import plot_html
 from app.viewer.tabs.program.program import LARGEST, MOST, PAUSE, Segments, recorded, replaced, targets
 from app.viewer.tabs.program.settings import Planned, ProgramFacts, ProgramSettings
-from app.viewer.tabs.program.typed import NUMBERS, Fields
+from app.viewer.tabs.program.typed import Fields
 from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
@@ -43,11 +43,13 @@ from kin.motion.program import Kind, Segment, Target
 from kin.path import PathPostures
 from kin.transforms import Array
 from kin.typed import EntryError
+from kin.units import general
 from kin.warmup import MOTIONS
 
 REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again
 REPORT = 0.1  # s between two looks at the progress of a search
 LINK = 7000  # bytes of all programs in a link
+RATE, MOST_SAMPLES = 100.0, 30_000  # of a saved motion, a second and in all: a longer one has fewer a second
 USUAL = ProgramSettings().state()  # a link holds what is different
 CHOICES = ("loop", "rate", "path", "ghosts", "frames", "compare", "language")  # settings that the page sends
 # What undo calls a change of a row, and of the program; "": the title of the tab.
@@ -88,14 +90,15 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
 
     def panel(self) -> Sequence[Node]:
         f, s, units = self.read, self.settings, self.stage.units
-        opened, search, drawn = (f.chosen, f.point), (s.seconds, s.seed), (s.path, s.ghosts, s.frames)
+        opened, drawn = (f.chosen, f.point), (s.path, s.ghosts, s.frames)
+        form = [self.spec(name).cell(f"way-{name}", getattr(s, name), units) for name in ("seconds", "seed")]
         found = f.work("way") if s.search else None
         return [
             Html(views.player, (f.plan, f.playable, s.rate, s.loop, drawn, units)),
             Html(views.clock, (f.plan, f.time, s.playing)),
             Html(views.list_html, (f.plan, opened, f.fault, s.loop, self._fields, s.by_pose, s.revision)),
             Html(postures.html, (f.chart, f.work("postures").value, units)),
-            Html(ways.html, (f.way, found, search, units)),
+            Html(ways.html, (f.way, found, s.seconds, form, units)),
             Html(plot_html, (f.motion, s.joint, units, f.other)),
             Html(views.summary, (f.plan, s.own, units)),
             Html(views.comparison, (f.whole, f.other, s.compare, s.zone, units)),
@@ -477,7 +480,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if not isinstance(text, str):
             raise InputError(name, text, "a text")
         try:
-            self.change(**{name: (ways.SETTINGS | {"zone": NUMBERS["blend"]})[name].read(text, self.stage.units)})
+            self.change(**{name: self.spec(name).typed(text, self.stage.units)})
         except EntryError as error:
             self._refuse(error.title, error.detail)
 
@@ -554,13 +557,19 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if motion is None:
             return
         motion = replace(motion, robot=named(motion.robot)) if self.settings.own else motion
+        rate = min(RATE, MOST_SAMPLES / max(motion.duration, 1e-9))
         try:
-            file, data, sampled = motion_file(motion, name)
+            if not isinstance(name, str) or name not in views.MOTIONS:
+                raise InputError("format", name, "one of " + ", ".join(views.MOTIONS))
+            kind = FORMATS[name]
+            data = b"".join(kind.pieces(motion, rate))
         except InputError as error:
             self._refuse("The motion was not saved", f"This format is for {error.expected}.")
             return
         part = "" if f.whole is not None else "Only up to where the program ends. "
-        save_file(self.stage, file, data, f"{part}{sampled}Radians, metres and seconds.")
+        sampled = "" if name == "urscript" else f"{general(rate, 4)} samples per second. "
+        words = f"{part}{sampled}Radians, metres and seconds."
+        save_file(self.stage, f"{motion.robot.id}-motion{kind.suffix}", data, words)
 
     def _upload(self, value: object) -> None:
         try:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import kin
+from app.viewer.declared.fields import Measure, Number
 from app.viewer.own_arm import clean
-from app.viewer.panel.entry import PERCENT, SECONDS, NumberField, read_value
+from app.viewer.panel.entry import read_value
 from app.viewer.tabs.program.program import NAME, Point, point, recorded, with_target
 from kin import InputError, Robot
 from kin.axes import inverse
@@ -26,29 +26,40 @@ SLOWEST, FARTHEST, FASTEST = 0.01, 1000.0, 1000.0  # of the limits; m; m/s or ra
 EXACT = 12  # digits of a typed joint value
 # By the fields of segments: a row has those of its class.
 NUMBERS = {
-    "seconds": NumberField("Wait", 0.0, LONGEST_DWELL, SECONDS),
-    "speed": NumberField("Speed", SLOWEST, 1.0, PERCENT, "Part of the velocity limits of the joints"),
-    "acceleration": NumberField(
-        "Acceleration", SLOWEST, 1.0, PERCENT, "Part of the acceleration and jerk limits of the joints"
+    "seconds": Number(label="Wait", limits=(0.0, LONGEST_DWELL), measure="s"),
+    "speed": Number(
+        label="Speed", limits=(SLOWEST, 1.0), measure="%", hint="Part of the velocity limits of the joints"
     ),
-    "blend": NumberField(
-        *("Zone radius", 0.0, FARTHEST, "length"),
-        "Blend radius: within it the path may leave for the next waypoint. Empty: the arm stops here",
+    "acceleration": Number(
+        label="Acceleration",
+        limits=(SLOWEST, 1.0),
+        measure="%",
+        hint="Part of the acceleration and jerk limits of the joints",
+    ),
+    "blend": Number(
+        label="Zone radius",
+        limits=(0.0, FARTHEST),
+        measure="length",
+        hint="Blend radius: within it the path may leave for the next waypoint. Empty: the arm stops here",
         empty="the arm stops",
         nothing=0.0,
     ),
-    "tool_speed": NumberField(
-        *("Tool speed ≤", 0.0, FASTEST, "length"),
-        "Largest speed of the tool point, for a process such as welding, or for safety beside people. Empty: only "
-        "the joints limit it",
+    "tool_speed": Number(
+        label="Tool speed ≤",
+        limits=(0.0, FASTEST),
+        measure="length",
+        hint="Largest speed of the tool point, for a process such as welding, or for safety beside people. Empty: "
+        "only the joints limit it",
         rate=True,
         above=True,
         empty="no limit",
     ),
-    "tool_turn": NumberField(
-        *("Tool turn ≤", 0.0, FASTEST, "angle"),
-        "Largest angular velocity of the tool, for example so that a full cup does not spill. Empty: only the "
-        "joints limit it",
+    "tool_turn": Number(
+        label="Tool turn ≤",
+        limits=(0.0, FASTEST),
+        measure="angle",
+        hint="Largest angular velocity of the tool, for example so that a full cup does not spill. Empty: only "
+        "the joints limit it",
         rate=True,
         above=True,
         empty="no limit",
@@ -81,11 +92,10 @@ class Fields(NamedTuple):
         """The joint values, likewise."""
         found = []
         for i, (joint, turning) in enumerate(zip(self.robot.joints, self.robot.revolute.tolist(), strict=True)):
-            field = NumberField(
-                f"{i + 1} {joint.name}", -math.inf, math.inf, "angle" if turning else "length", joint.name
-            )
+            measure: Measure = "angle" if turning else "length"
+            spec = Number(label=f"{i + 1} {joint.name}", measure=measure, hint=joint.name)
             value = self.units.of(turning).number(float(q[i]), 3)
-            found.append(field.cell(f"q{i}", None, self.units) | {"value": value})
+            found.append(spec.cell(f"q{i}", None, self.units) | {"value": value})
         return found
 
     def place(self, q: Array) -> tuple[str, str]:
@@ -117,7 +127,8 @@ class Fields(NamedTuple):
         if field == "name":
             return replace(row, name=clean(text, NAME))
         if field in NUMBERS and field in field_names(type(row)):
-            return replace(row, **{field: NUMBERS[field].read(text, self.units)})
+            changed: Any = {field: NUMBERS[field].typed(text, self.units)}
+            return replace(row, **changed)
         if isinstance(row, Dwell):
             raise InputError("field", field, "name or seconds")
         if field == "via" and isinstance(row, Circ):

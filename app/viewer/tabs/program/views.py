@@ -10,7 +10,6 @@ from app.viewer.live.tape import BYTES
 from app.viewer.panel.share import box_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.program.compare import CHOICES, Choice, about, jerk_is_infinite
-from app.viewer.tabs.program.files import MOTIONS
 from app.viewer.tabs.program.plan import Fault, Plan
 from app.viewer.tabs.program.program import LARGEST, MOST, Segments, places, start_of
 from app.viewer.tabs.program.settings import RATES
@@ -30,6 +29,14 @@ KINDS: dict[Kind, tuple[str, str]] = {
     "lin": ("LIN – tool on a straight line", "LIN"),
     "circ": ("CIRC – tool on an arc", "CIRC"),
     "spline": ("Spline – smooth curve", "spline"),
+}
+# Formats of a motion over time, of `app.exports.motion`.
+MOTIONS = {
+    "csv-commented": "CSV",
+    "trajectory-yaml": "ROS YAML",
+    "trajectory-json": "ROS JSON",
+    "mcap": "MCAP",
+    "urscript": "URScript",
 }
 QUANTITIES: dict[Quantity, str] = {"velocity": "velocities", "acceleration": "accelerations", "jerk": "jerks"}
 EXCEEDED = 1.0 + 1e-6

@@ -14,22 +14,17 @@ import numpy as np
 import kin.way
 from app.shared.computations import SharedComputation
 from app.viewer.declared.work import Result
-from app.viewer.panel.entry import SECONDS, NumberField
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.program import MOST, Segments, options, places, recorded
 from app.viewer.views.templates import render
 from kin.motion import Dwell, JointTarget, Ptp
 from kin.motion.program import Segment
-from kin.units import Unit, Units
-from kin.way import MOST_SEED, find_way, way_program
+from kin.units import Units
+from kin.way import find_way, way_program
 
 SHORTEST, USUAL, LONGEST = 0.1, 5.0, 60.0  # seconds of a search
 STEPS = 100  # of its progress
 SEED_HINT = "The search is random: another seed may find another way, the same seed finds the same one again"
-SETTINGS = {
-    "seconds": NumberField("Time limit", SHORTEST, LONGEST, SECONDS),
-    "seed": NumberField("Seed", 0, MOST_SEED, Unit("", 1.0, 0), SEED_HINT, whole=True),
-}
 
 
 @dataclass(frozen=True)
@@ -108,11 +103,13 @@ def with_way(segments: Segments, before: int, index: int, between: Sequence[Segm
     return (*segments[:before], stop, *segments[before + 1 : index], *between, end, *segments[index + 1 :])
 
 
-def html(asked: Asked | None, result: Result | None, settings: tuple[float, int], units: Units) -> str:
-    """The form, or how far the search is; `result`: of the search, None without one."""
+def html(
+    asked: Asked | None, result: Result | None, seconds: float, fields: Sequence[object], units: Units
+) -> str:
+    """The form with its `fields`, or how far the search is; `result`: of the search, None without one."""
     if asked is None:
         return ""
-    arm, fields = asked.arm, zip(SETTINGS.items(), settings, strict=True)
+    arm = asked.arm
     start = asked.plan.before(asked.index)
     none = result.value if result is not None and isinstance(result.value, NotFound) else None
     return render(
@@ -124,8 +121,8 @@ def html(asked: Asked | None, result: Result | None, settings: tuple[float, int]
         share=None if result is None or result.finished else result.done / STEPS,
         title="" if none is None else none.title,
         words="" if none is None else none.explain(units),
-        seconds=settings[0],
-        fields=[field.cell(f"way-{name}", value, units) for (name, field), value in fields],
+        seconds=seconds,
+        fields=fields,
     )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from program_page import part, press
 
 import kin
 from app.exports.motion import FORMATS
@@ -18,9 +19,9 @@ from app.exports.motion_snippets import SNIPPETS
 from app.exports.snippets import Service
 from app.shared.store import Store
 from app.viewer.session.state import decode
-from app.viewer.tabs.program.files import MOTIONS
 from app.viewer.tabs.program.postures import PLACES
 from app.viewer.tabs.program.program import MOST
+from app.viewer.tabs.program.views import MOTIONS
 from kin.motion.planning.starts import segment_poses
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -52,23 +53,8 @@ def tab(page: FakeBrowser) -> FakeBrowser:
     return page
 
 
-def part(tab: FakeBrowser, name: str) -> str:
-    found = [
-        m["props"]["content"]
-        for m in tab.gui.values()
-        if f'data-program="{name}"' in m["props"].get("content", "")
-    ]
-    return found[0] if found else ""
-
-
 def clock(tab: FakeBrowser) -> dict[str, str]:
     return dict(re.findall(r'data-(\w+)="([^"]*)"', part(tab, "clock")))
-
-
-def press(tab: FakeBrowser, name: str, *index: int, value: object = None) -> None:
-    tab.serial = getattr(tab, "serial", 0) + 1  # type: ignore[attr-defined]
-    number = tab.say("feature", ["program", [name, *index, tab.serial], value])  # type: ignore[attr-defined]
-    tab.wait(lambda: tab.script["reply"][0] >= number)
 
 
 def is_drawn(tab: FakeBrowser, name: str) -> bool:

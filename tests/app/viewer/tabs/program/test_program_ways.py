@@ -10,8 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import program_page
 import pytest
 from fake_browser import FakeBrowser
+from program_page import press
 from versions import needs_ompl
 
 import kin
@@ -43,18 +45,7 @@ def opened(robot: kin.Robot, obstacles: tuple[kin.Obstacle, ...], rows: list[lis
 
 
 def part(tab: FakeBrowser, name: str) -> str:
-    found = [
-        m["props"]["content"]
-        for m in tab.gui.values()
-        if f'data-program="{name}"' in m["props"].get("content", "")
-    ]
-    return html.unescape(found[0]) if found else ""
-
-
-def press(tab: FakeBrowser, name: str, *index: int, value: object = None) -> None:
-    tab.serial = getattr(tab, "serial", 0) + 1  # type: ignore[attr-defined]
-    number = tab.say("feature", ["program", [name, *index, tab.serial], value])  # type: ignore[attr-defined]
-    tab.wait(lambda: tab.script["reply"][0] >= number)
+    return html.unescape(program_page.part(tab, name))
 
 
 def rows(tab: FakeBrowser) -> int:
