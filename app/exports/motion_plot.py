@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.exports.svg import joint_colour, text_of, tick_labels
+from app.exports.svg import Axes, AxisStyle, Plot, Series, joint_colour, text_of, tick_labels
 from kin.motion import Motion
 from kin.transforms import Array
 
@@ -13,6 +13,7 @@ LEFT, RIGHT, TOP, GAP = 84.0, 40.0, 84.0, 70.0
 SAMPLES = 1200
 LONGEST = 115  # characters of the reason
 INK, QUIET = "#20252a", "#c3c8cc"
+STYLE = AxisStyle(f'stroke="{QUIET}" stroke-width=".6"', "", "", length=3.0, grid=True)
 
 
 def motion_plot(motion: Motion) -> str:
@@ -56,37 +57,21 @@ def _panel(
 ) -> str:
     """One line per joint over time, the ends of segments, and a band of what is allowed."""
     low, high = (float(values.min()), float(values.max())) if band is None else (1.1 * band[0], 1.1 * band[1])
-    room = max(0.05 * (high - low), 1e-3)
-    low, high = (low - room, high + room) if band is None else (low, high)
-    wide = WIDTH - LEFT - RIGHT
-
-    def x(t: float) -> float:
-        return LEFT + wide * t / motion.duration
-
-    def y(value: float) -> float:
-        return top + height * (high - value) / (high - low)
-
-    parts = []
-    if band is not None:
-        parts.append(
-            f'<rect x="{LEFT:g}" y="{y(band[1]):.1f}" width="{wide:g}" height="{y(band[0]) - y(band[1]):.1f}" '
-            'fill="#eef4f8"/>'
-        )
-    for value, text in tick_labels(low, high, 1.0):
-        parts.append(f'<path d="M{LEFT:g} {y(value):.1f}H{LEFT + wide:g}" stroke="{QUIET}" stroke-width=".6"/>')
-        parts.append(f'<text x="{LEFT - 6:g}" y="{y(value) + 4:.1f}" text-anchor="end">{text}</text>')
-    for value, text in tick_labels(0.0, motion.duration, 1.0):
-        parts.append(f'<text x="{x(value):.1f}" y="{top + height + 16:.1f}" text-anchor="middle">{text}</text>')
+    room = max(0.05 * (high - low), 1e-3) if band is None else 0.0
+    plot = Plot(LEFT, top, WIDTH - LEFT - RIGHT, height, (0.0, motion.duration), (low - room, high + room))
+    parts = [] if band is None else [plot.box(plot.x, band, 'fill="#eef4f8"')]
+    parts.append(Axes(plot, x=(), style=STYLE).svg())
+    for value, text in tick_labels(*plot.x, 1.0):
+        x = float(plot.at((value, low))[0])
+        parts.append(f'<text x="{x:.1f}" y="{plot.bottom + 16:.1f}" text-anchor="middle">{text}</text>')
     dashes = f'stroke="{QUIET}" stroke-dasharray="4 3"'
-    ends = [x(each.end) for each in motion.segments]
-    parts.extend(f'<path d="M{end:.1f} {top:g}V{top + height:g}" {dashes}/>' for end in ends)
+    ends = [np.array([[each.end, plot.y[0]], [each.end, plot.y[1]]]) for each in motion.segments]
+    parts.extend(f'<path d="{plot.path(end)}" {dashes}/>' for end in ends)
     for joint in range(motion.robot.n):
-        points = "L".join(
-            f"{x(t):.1f} {y(v):.1f}" for t, v in zip(times.tolist(), values[:, joint].tolist(), strict=True)
-        )
-        parts.append(f'<path d="M{points}" fill="none" stroke="{joint_colour(joint)}" stroke-width="1.8"/>')
+        look = f'fill="none" stroke="{joint_colour(joint)}" stroke-width="1.8"'
+        parts.append(Series(plot, np.column_stack([times, values[:, joint]]), look).svg())
     parts.append(f'<text x="{LEFT:g}" y="{top - 8:g}" font-weight="600">{title}</text>')
-    parts.append(f'<text x="{LEFT + wide:g}" y="{top + height + 32:g}" text-anchor="end">time (s)</text>')
+    parts.append(f'<text x="{plot.right:g}" y="{plot.bottom + 32:g}" text-anchor="end">time (s)</text>')
     return "".join(parts)
 
 
