@@ -87,9 +87,9 @@ def match(robot: Robot) -> General6 | None:
         opposite = None if len(cuts) else loop_with_opposite_slides(reading.robot)
         if opposite is not None:
             kernels, solve = opposite_kernels(opposite), solve_opposite
-        missed = _missed(reading.robot, kernels)
+        missed, proved = _tried(reading.robot, kernels.params, solve)
         if len(kernels.params) and (best is None or missed < best[0]):
-            best = missed, General6(robot, kernels, on_axis, reading, solve)
+            best = missed, General6(robot, kernels, on_axis, reading, solve, proved)
         if missed <= _RARE:
             break
     return best[1] if best is not None and best[0] < _POSES // 2 else None
@@ -109,19 +109,18 @@ def moves_freely(robot: Robot) -> bool:
     return int(np.linalg.matrix_rank(J, rtol=_REGULAR).max()) == 6
 
 
-def _missed(robot: Robot, kernels: BatchKernels) -> int:
-    """How many of the random poses have an odd number of solutions, or none."""
-    if not len(kernels.params):
-        return _POSES
-    q, T = _poses(robot)
-    out = np.empty((_POSES, SOLUTIONS, 6))
-    kernels.many(kernels.params, T, np.array([math.nan]), q[0], out)
+def _tried(robot: Robot, params: Array, solve: SolveAll) -> tuple[int, int]:
+    """How many of the random poses have an odd number of solutions, or none, and how many have certainly all."""
+    if not len(params):
+        return _POSES, 0
+    out, T = np.empty((_POSES, SOLUTIONS, 6)), _poses(robot)[1]
+    proved = [solve(params, pose, rows) for pose, rows in zip(T, out, strict=True)].count(PROVED)
     count = (~np.isnan(out[:, :, 0])).sum(axis=1)
-    return int(((count % 2 == 1) | (count == 0)).sum())
+    return int(((count % 2 == 1) | (count == 0)).sum()), proved
 
 
 def _best_cuts(robot: Robot) -> Array:
-    """The parameters of the best valid cuts, concatenated: the most exact ones, and of these those that find most.
+    """The parameters of the best valid cuts, concatenated: those that miss least, of these those that prove most.
 
     A cut counts as valid if it is for most of a few poses; one that misses a quarter of the poses is not used. A
     cut that would be degenerate but for the rounding of the table is valid with a large misfit.
@@ -133,14 +132,14 @@ def _best_cuts(robot: Robot) -> Array:
         misfit = max(float(np.median([misfit_of_degree(cut, pose) for pose in T[:_PROBES]])), _EXACT)
         if not misfit <= _VALID:
             continue
-        branches_many(cut, T, np.array([math.nan]), q[0], out)
+        proved = [solve_all(cut, pose, rows) for pose, rows in zip(T, out, strict=True)].count(PROVED)
         there = ~np.isnan(out[:, :, 0])
         away = apart(out, q[:, None], robot.revolute)
         away[~there] = math.inf
         missed = int((away.min(axis=1) > 1e-6).sum())
         if missed < _POSES // 4:
             off = int(math.log(misfit / _EXACT) / math.log(_SIMILAR))
-            ranked.append((off, missed, -int(there.sum()), len(ranked), cut))
+            ranked.append((missed, -proved, off, len(ranked), cut))
     ranked.sort(key=lambda entry: entry[:4])
     return np.concatenate([entry[4] for entry in ranked[:_CUTS]] or [np.empty(0)])
 
@@ -153,6 +152,7 @@ class General6(ClosedForm):
 
     Attributes:
         reading: the order in which the kernels read the arm's joints.
+        proved: of how many of a few random poses the solutions are proved to be all.
     """
 
     name, title, branches = NAME, TITLE, BRANCHES
@@ -160,12 +160,18 @@ class General6(ClosedForm):
     named = False
 
     def __init__(
-        self, robot: Robot, kernels: BatchKernels, tool_on_axis: bool, reading: Reading, solve: SolveAll
+        self,
+        robot: Robot,
+        kernels: BatchKernels,
+        tool_on_axis: bool,
+        reading: Reading,
+        solve: SolveAll,
+        proved: int,
     ) -> None:
         self.robot = robot
         self.tool_on_axis = tool_on_axis
         self.kernels = reading.kernels(kernels)
-        self.reading, self._solve = reading, solve
+        self.reading, self._solve, self.proved = reading, solve, proved
         slides = int((~robot.revolute).sum())
         kind = ("revolute joints", "joints, one of which slides,", "joints, two of which slide,")[slides]
         self.reason = f"six {kind} whose axes fit no closed form: all real solutions by elimination"

@@ -12,8 +12,9 @@ from arms import nested, reversed_at
 import kin
 from kin import InputError, Joint, Robot, Status
 from kin.solvers import closed_form_of, general6
-from kin.solvers.general6.batch import misfit_of_degree
+from kin.solvers.general6.batch import PROVED, SOLUTIONS, misfit_of_degree, solve_all
 from kin.solvers.general6.cuts import SHIFT, SIZE, cuts_of
+from kin.solvers.reduced import fixed
 
 PI = math.pi
 NO_LIMITS = (-PI, PI)
@@ -293,3 +294,14 @@ def test_two_postures_beside_a_fold_are_two():
     off = 3e-4 * np.linalg.svd(kin.jacobian(JACO, fold))[2][5]
     found = kin.solve_ik(JACO, kin.fk(JACO, fold + off), q_seed=fold, respect_limits=False).solutions
     assert sum(apart(s.q, fold) < 2e-3 for s in found) == 2
+
+
+@pytest.mark.parametrize(
+    "robot", [fixed(kin.get_robot("sawyer"), {6: 0.0}), kin.get_robot("gofa")], ids=["sawyer", "gofa"]
+)
+def test_the_cut_that_proves_most_is_asked_first(robot):
+    params, out = closed_form_of(robot).kernels.params, np.empty((SOLUTIONS, 6))
+    poses = kin.fk(robot, np.random.default_rng(3).uniform(-PI, PI, (40, 6)))
+    proved = [sum(solve_all(cut, T, out) == PROVED for T in poses) for cut in params.reshape(-1, SIZE)]
+    assert len(proved) > 1
+    assert proved[0] > 0.9 * max(proved) > 30
