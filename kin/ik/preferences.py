@@ -19,7 +19,7 @@ from kin.ik.branches import Branches, Flags, candidates_of, is_closed, measure, 
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import IKProblem
 from kin.kernels import jacobian as jacobian_kernels
-from kin.solvers.contract import POSE, POSITION
+from kin.solvers.contract import POSE, POSITION, weakest
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -131,6 +131,7 @@ def _improve_all(problem: IKProblem, branches: Branches, good: Flags) -> None:
         return
     branches.q, branches.stats = centred(problem, found.q)
     branches.values, branches.arcs, branches.closed = found.values, found.arcs, found.closed
+    branches.completeness = weakest(found.completeness, "searched")  # at the best value of many
     good[:] = found.good
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kin.angles import TURN, apart, wrapped
-from kin.axes import frame_of, inverse, lines_of, perpendicular_to
+from kin.angles import TURN, wrapped
+from kin.axes import frame_of, inverse, lines_of, perpendicular_to, size
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import turn_around
@@ -25,25 +27,26 @@ from kin.solvers.contract import (
     SolverInput,
     weakest,
 )
+from kin.solvers.general6 import General6
 from kin.solvers.general7.motion import nearest_on_motion, to_images
 from kin.solvers.reduced import fixed
 from kin.solvers.reversed import WrappedKernels
+from kin.solvers.selfmotion.following import Followed
+from kin.solvers.selfmotion.points import JOINT, SETTING
 from kin.solvers.selfmotion.tracing import end_of_motion
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "general7"
 TITLE = "all solutions, seven revolute joints of which one is given"
-_SCAN = 64  # values that are tried where the nearest solution, or any feasible one, is looked for
-# Samples of a turn for the ranges of all solutions, and between two of them where solutions come close to the
-# limits; how close (rad, all joints together); motion between two samples that counts as going on (rad).
-_SAMPLES, _FINER, _CLOSE, _SAME_MOTION = 144, 12, 0.3, 0.3
-# Of the search for the nearest solution: parts of what is between two values where it is looked at closely, how
-# near what is there has to be, self-motions that are followed, how far from those before they begin, and how much
-# farther from the seed than the nearest one (rad).
-_PARTS, _NEARER, _DOWNHILL, _SAME_START, _BEYOND = 6, 0.3, 12, 0.2, 1.0
+# Values of a turn at which all solutions are computed, also where a nominal arm has some; how far outside limits
+# self-motions are followed (rad); how much wider the nominal arm's limits and reach are (rad, arm sizes).
+_VALUES, _FEWER, _MARGIN, _WIDER, _LONGER = 48, 12, 0.6, 0.1, 0.01
+# Of the search for the nearest solution: self-motions that are followed downhill, how far from those before they
+# begin, and how much farther from the seed than the nearest one (rad): more than half the way to the next point.
+_DOWNHILL, _SAME_START, _BEYOND = 12, 0.2, 0.1
 
-
+_NONE = np.empty((0, 7))
 Match = Callable[[Robot], ClosedForm | None]
 
 
@@ -60,16 +63,22 @@ def match(robot: Robot, form_of: Match, family_of: Match) -> General7 | None:
     last = form_of(without_last)
     if last is not None and last.named:
         return General7(robot, 6, last)
-    if first := family_of(without_first) if last is not None else form_of(without_first):
-        return General7(robot, 0, first)
-    return None if last is None else General7(robot, 6, last)
+    first = family_of(without_first) or form_of(without_first)
+    if last is None or (first is not None and first.named):
+        return None if first is None else General7(robot, 0, first)
+    form = General7(robot, 6, last)
+    if isinstance(first, General6) and isinstance(last, General6) and first.proved > last.proved:
+        form.sweeper = General7(robot, 0, first)
+    nominal = None if robot.nominal_arm is None else family_of(robot.nominal_arm)
+    form.sweeper.nominal = None if nominal is None else nominal.relaxed(_LONGER * size(robot))
+    return form
 
 
-def _is_beside(q: Array, start: Array, end: Array) -> bool:
-    """Whether a configuration is near the segment between two others."""
+def _beside(q: Array, start: Array, end: Array) -> NDArray[np.bool_]:
+    """Which configurations ``(k, 7)`` are near the segment between two others."""
     along, to = end - start, q - start
-    share = min(max(float(to @ along) / max(float(along @ along), 1e-12), 0.0), 1.0)
-    return bool(np.abs(to - share * along).max() < _SAME_START)
+    share = np.clip((to @ along) / max(float(along @ along), 1e-12), 0.0, 1.0)
+    return np.asarray(np.abs(to - share[:, None] * along).max(axis=1) < _SAME_START)
 
 
 class Fold:
@@ -119,6 +128,55 @@ class Fold:
         return WrappedKernels(form.params, one, many, self.kernels, form)
 
 
+class Motions:
+    """The self-motions of a target through some of its solutions, as far as they keep the limits or come close.
+
+    Attributes:
+        joint: whose values say where they are.
+        limits: ``(2, 7)`` of the joints.
+        ranges: ``(m, 2)`` the joint's values on each piece that keeps the limits, at some whole turn. Where the
+            joint turns back, another piece begins.
+        inner: ``(m, 7)`` a configuration inside each.
+        points: ``(M, 7)`` configurations along them, close to each other.
+        lost: whether one of them could not be followed.
+    """
+
+    def __init__(self, robot: Robot, problem: SolverInput, joint: int, q: Array, others: Array = _NONE) -> None:
+        self.joint, setting, self._found = joint, np.zeros(SETTING), Followed()
+        setting[JOINT] = joint
+        self.limits = np.clip((problem.lower, problem.upper), -UNBOUNDED, UNBOUNDED)
+        self._goal = robot.model, problem.T, setting, self.limits, _MARGIN
+        count, lost = self._found.follow(*self._goal, np.concatenate([q, others]))
+        self.ranges, self.inner = self._found.pieces[:count, :2].copy(), self._found.postures[:count, 2].copy()
+        self.points, self.lost = self._found.points, bool(lost[: len(q)].any())
+
+    def counts(self, values: Array) -> NDArray[np.int64]:
+        """How many pieces have each value ``(N,)`` of the joint."""
+        ahead = (values[:, None] - self.ranges[:, 0] + TOLERANCES.limit) % TURN
+        return np.asarray((ahead <= self.ranges[:, 1] - self.ranges[:, 0] + 2.0 * TOLERANCES.limit).sum(axis=1))
+
+    def have(self, q: Array) -> bool:
+        """Whether configurations ``(k, 7)`` inside the limits that meet the target are all on them."""
+        more, lost = self._found.follow(*self._goal, q)
+        return more == 0 and not lost.any()
+
+
+class Sweep(NamedTuple):
+    """What all values of a target's redundancy parameter were searched for, and what is there.
+
+    Attributes:
+        motions: the self-motions.
+        rows, outside: ``(k, 7)`` all solutions at the values at which they were computed, and ``(k,)`` how far
+            each is outside the limits; NaN and ∞ where there is none.
+        agreed: whether at each of these values as many solutions keep the limits as motions that were followed do.
+    """
+
+    motions: Motions
+    rows: Array
+    outside: Array
+    agreed: bool
+
+
 class General7(ClosedForm):
     """All solutions of an arm with seven revolute joints for a given value of its last or first joint.
 
@@ -126,14 +184,19 @@ class General7(ClosedForm):
         given: that joint.
         form: the solver of the other six.
         fold: moves its rotation into their target.
+        sweeper: searches all values: the same with the joint at the other end given, if that is solved with more
+            certainty, or itself.
+        nominal: of a calibrated arm the solver of the nominal one, with some more reach.
     """
 
     name, title = NAME, TITLE
     lengths = ()
     named = steady = exact_ranges = False
+    nominal: ClosedForm | None = None
 
     def __init__(self, robot: Robot, joint: int, form: ClosedForm) -> None:
         self.robot, self.given, self.form, self.off = robot, joint, form, form.off
+        self.sweeper = self
         self.reason = (
             f"seven revolute joints whose axes fit no closed form; joint {joint + 1} is given ({form.name})"
         )
@@ -152,65 +215,76 @@ class General7(ClosedForm):
         return rolled.parameters(self._parameter) if task == APPROACH else (self._parameter,)
 
     def solve(self, problem: SolverInput) -> Candidates:
-        """All solutions at one value of the given joint, requested or that of the nearest one, and their ranges.
-
-        Where none is found inside the limits, the feasible value nearest to the seed's is looked for.
-        """
+        """All solutions at one value of the given joint, requested or the nearest one's, and their ranges."""
         if problem.task == APPROACH:
             return rolled.solve_approach(self, problem, self._roll)
-        p, requested = problem, problem.values[0]
+        p, value, sweep = problem, problem.values[0], None
         low, high = float(p.lower[self.given]), float(p.upper[self.given])
-        value = min(max(float(p.seed[self.given]), low), high) if math.isnan(requested) else requested
-        if math.isnan(requested):
-            value = self._value_of_nearest(p, value)
+        if math.isnan(value) and low == high:
+            value = low
+        elif math.isnan(value):
+            sweep = self.sweeper.sweep(p)
+            value = self._value_of_nearest(p, sweep)
         out = self._at(p, np.array([value]))[0]
-        if math.isnan(requested) and p.respect_limits and not self._inside(p, out).any():
-            value, out = self._nearest_value(p, value, out)
-        # All solutions at one value of the given joint: at others there may be further branches.
         known = self._add_missing(p, value, out)
-        completeness = weakest(known, "searched") if math.isnan(requested) and low < high else known
+        if sweep is not None:
+            agreed = sweep.agreed and sweep.motions.have(out[self._outside(p, out) == 0.0])
+            known = weakest(known, "agreed" if agreed else "searched")
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
-        further = (lambda: self._all_ranges(p)) if p.respect_limits else None
-        return Candidates(out, values, (arcs,), completeness=completeness, further=further)
+        further = (lambda: self._all_ranges(p, sweep)) if p.respect_limits else None
+        return Candidates(out, values, (arcs,), completeness=known, further=further)
 
-    def _value_of_nearest(self, problem: SolverInput, value: float) -> float:
-        """The value of the given joint at the solution nearest to the seed; `value` if none is found.
-
-        Samples of a turn tell where solutions are; from the nearest ones self-motions are followed downhill.
-        """
+    def sweep(self, problem: SolverInput) -> Sweep:
+        """What is found at values of the given joint, also the seed's, and along the self-motions from there."""
         p, i = problem, self.given
-        low, high = turn_around(float(p.lower[i]), float(p.upper[i]), value)
-        tried = np.unique(np.append(np.linspace(low, high, _SCAN), value))
-        found, lower, upper = self._at(p, tried), *(np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (p.lower, p.upper))
-        q = found.reshape(-1, 7)
-        squares, outside = np.empty(len(q)), self._outside(p, found)
-        away = np.linalg.norm(wrapped(found - p.seed), axis=-1)  # at least
-        to_images(q, p.seed, lower, upper, i, squares)
-        # Where solutions begin to exist, or come close to the limits, there may be nearer ones between two values.
-        near = away < math.sqrt(squares.min()) + _NEARER
-        close, there = ((outside > 0.0) & (outside < _CLOSE) & near).any(axis=1), np.isfinite(away).sum(axis=1)
-        folds = (there[1:] != there[:-1]) & (near[1:] | near[:-1]).any(axis=1)
-        cells = np.flatnonzero(folds | close[1:] | close[:-1])
-        shares = np.arange(1, _PARTS) / _PARTS
-        more = self._at(p, (tried[cells, None] + np.diff(tried)[cells, None] * shares).ravel()).reshape(-1, 7)
-        further = np.empty(len(more))
-        to_images(more, p.seed, lower, upper, i, further)
-        q, squares = np.concatenate([q, more]), np.concatenate([squares, further])
-        best, least = value, math.inf
-        walked: list[tuple[Array, Array]] = []
-        for k in np.argsort(squares).tolist():
-            if not math.sqrt(squares[k]) < math.sqrt(least) + _BEYOND or len(walked) == _DOWNHILL:
+        least, most = float(p.lower[i]), float(p.upper[i])
+        low, high = turn_around(least, most, min(max(float(p.seed[i]), least), most))
+        known = self._of_nominal(p)
+        count = math.ceil((_FEWER if len(known) else _VALUES) * (high - low) / TURN)
+        inset = min(TOLERANCES.interval_inset, 0.5 * (high - low))  # a motion is not begun at a limit
+        value = min(max(float(p.seed[i]), low + inset), high - inset)
+        values = np.unique(np.append(low + (np.arange(count) + 0.5) * ((high - low) / max(count, 1)), value))
+        rows = self._at(p, values)
+        outside = self._outside(p, rows)
+        motions, inside = Motions(self.robot, p, i, rows[outside < _MARGIN], known), outside == 0.0
+        agreed = inside.any() and not motions.lost and (motions.counts(values) == inside.sum(axis=1)).all()
+        return Sweep(motions, rows.reshape(-1, 7), outside.ravel(), bool(agreed))
+
+    def _of_nominal(self, problem: SolverInput) -> Array:
+        """A configuration ``(k, 7)`` of the nominal arm inside each of its ranges, close to the arm's motions."""
+        if self.nominal is None:
+            return _NONE
+        p, free = problem, (math.nan,)
+        lower, upper = p.lower - _WIDER, p.upper + _WIDER
+        arcs = self.nominal.solve(replace(p, values=free, respect_limits=True, lower=lower, upper=upper)).arcs[0]
+        T = np.ascontiguousarray(np.broadcast_to(p.T, (len(arcs), 4, 4)))
+        return self.nominal.rows_at(T, arcs[:, 1:].mean(axis=1), p.seed, arcs[:, 0].astype(np.intp))
+
+    def _value_of_nearest(self, problem: SolverInput, sweep: Sweep) -> float:
+        """The value of the given joint at the solution nearest to the seed; motions are followed downhill.
+
+        Where none is inside the limits, that of the solution that is least outside, or the seed's.
+        """
+        p, i, (lower, upper) = problem, self.given, sweep.motions.limits
+        q = np.concatenate([sweep.rows, sweep.motions.inner, sweep.motions.points])
+        squares, least = np.empty(len(q)), math.inf
+        to_images(q, p.seed, lower, upper, squares)
+        best = float(p.seed[i])
+        if squares.min() == math.inf > sweep.outside.min():
+            best = float(sweep.rows[sweep.outside.argmin(), i])
+        for _ in range(_DOWNHILL):
+            k = int(squares.argmin())
+            if not math.sqrt(squares[k]) < math.sqrt(least) + _BEYOND:
                 break
-            # A start beside a motion that has been followed ends where that one does.
-            if any(_is_beside(q[k], *ends) for ends in walked):
-                continue
-            start = q[k].copy()
-            distance = nearest_on_motion(self.robot.model, p.T, i, q[k], p.seed, lower, upper)
-            walked.append((start, q[k]))
+            end = q[k].copy()
+            distance = nearest_on_motion(self.robot.model, p.T, i, end, p.seed, lower, upper)
             if distance < least:
-                best, least = float(q[k, i]), distance
-        return best
+                best, least = float(end[i]), distance
+            # A start beside a motion that has been followed ends where that one does.
+            near = np.flatnonzero(squares < (math.sqrt(least) + _BEYOND) ** 2)
+            squares[near[_beside(q[near], q[k], end)]] = math.inf
+        return min(max(best, float(p.lower[i])), float(p.upper[i]))
 
     def _at(self, problem: SolverInput, values: Array) -> Array:
         """All solutions ``(N, rows, 7)`` at these values of the given joint."""
@@ -236,29 +310,6 @@ class General7(ClosedForm):
         total = np.maximum(off, 0.0).sum(axis=-1)
         return np.where(np.isnan(total), math.inf, total)
 
-    def _inside(self, problem: SolverInput, q: Array) -> Array:
-        return np.asarray(self._outside(problem, q) == 0.0)
-
-    def _nearest_value(self, problem: SolverInput, value: float, out: Array) -> tuple[float, Array]:
-        """The feasible value nearest to `value`, and the solutions there; else those least outside the limits."""
-        low, high = turn_around(float(problem.lower[self.given]), float(problem.upper[self.given]), value)
-        tried = np.linspace(low, high, _SCAN)
-        found = self._at(problem, tried)
-        miss = self._outside(problem, found).min(axis=1)
-        if not np.isfinite(miss).any():
-            return value, out
-        if miss.min() > 0.0:
-            here = float(self._outside(problem, out).min())
-            best = int(miss.argmin())
-            return (value, out) if here <= miss[best] else (float(tried[best]), found[best])
-        best = int(np.where(miss == 0.0, np.abs(tried - value), math.inf).argmin())
-        row = found[best, int(self._outside(problem, found[best]).argmin())]
-        end = self._end(problem, row, 1.0 if value > tried[best] else -1.0)
-        inset = min(TOLERANCES.interval_inset, 0.5 * abs(end - tried[best]))
-        nearest = end - math.copysign(inset, end - tried[best])
-        there = self._at(problem, np.array([nearest]))[0]
-        return (nearest, there) if self._inside(problem, there).any() else (float(tried[best]), found[best])
-
     def _end(self, problem: SolverInput, row: Array, sense: float) -> float:
         """The end of the self-motion from a solution inside the limits."""
         lower, upper = (np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (problem.lower, problem.upper))
@@ -268,66 +319,27 @@ class General7(ClosedForm):
         """The range of the given joint around each solution ``(rows, 7)`` that is inside the limits."""
         found = []
         least, most = float(problem.lower[self.given]), float(problem.upper[self.given])
-        for i in np.flatnonzero(self._inside(problem, out)).tolist():
+        for i in np.flatnonzero(self._outside(problem, out) == 0.0).tolist():
             low, high = (self._end(problem, out[i], sense) for sense in (-1.0, 1.0))
             if high - low >= TURN:
                 low, high = turn_around(least, most, float(out[i, self.given]))
             found.append((float(i), max(low, least), min(high, most)))
         return np.array(found).reshape(-1, 3)
 
-    def _all_ranges(self, problem: SolverInput) -> Array:
-        """The values ``(k, 2)`` of the given joint at which any solution is inside the limits.
-
-        Samples tell where there are solutions; the ends between two samples are found by following self-motions. A
-        range between two samples is found if solutions that are outside the limits come close to them there.
-        """
-        least, most = float(problem.lower[self.given]), float(problem.upper[self.given])
-        low, high = turn_around(least, most, float(problem.seed[self.given]))
-        if high <= low:
-            return np.empty((0, 2))
-        values = np.linspace(low, high, 1 + math.ceil(_SAMPLES * (high - low) / TURN))
-        found = self._at(problem, values)
-        outside = self._outside(problem, found)
-        near = outside.min(axis=1)
-        finer = [
-            np.linspace(values[i - 1], values[i + 1], 2 * _FINER + 1)[1:-1]
-            for i in range(1, len(values) - 1)
-            if 0.0 < near[i] < _CLOSE and near[i] <= near[i - 1] and near[i] <= near[i + 1]
-        ]
-        if finer:
-            values = np.unique(np.concatenate([values, *finer]))
-            found = self._at(problem, values)
-            outside = self._outside(problem, found)
-        inside = outside == 0.0
-        ranges: list[tuple[float, float]] = []
-        for i in np.flatnonzero(inside.any(axis=1)).tolist():
-            low = high = float(values[i])
-            if i > 0:
-                low = self._reached(
-                    problem, found[i - 1][inside[i - 1]], found[i][inside[i]], float(values[i - 1])
-                )
-            if i < len(values) - 1:
-                high = self._reached(
-                    problem, found[i + 1][inside[i + 1]], found[i][inside[i]], float(values[i + 1])
-                )
-            ranges.append((low, high))
-        turns: range | tuple[int, ...] = (0,)
-        if most - least < UNBOUNDED:
-            turns = range(math.floor((least - values[-1]) / TURN), math.ceil((most - values[0]) / TURN) + 1)
-        shifted = [(max(a + k * TURN, least), min(b + k * TURN, most)) for k in turns for a, b in ranges]
-        return np.array([(a, b) for a, b in shifted if a <= b]).reshape(-1, 2)
-
-    def _reached(self, problem: SolverInput, there: Array, here: Array, to: float) -> float:
-        """How far solutions `here` ``(k, 7)`` go on towards the next value; those there are `there` ``(m, 7)``."""
-        start = float(here[0, self.given])
-        if len(there) and apart(there[:, None], here).min() < _SAME_MOTION:
-            return to
-        sense = math.copysign(1.0, to - start)
-        lower, upper = problem.lower.copy(), problem.upper.copy()
-        lower[self.given], upper[self.given] = min(start, to), max(start, to)
-        cell = replace(problem, lower=lower, upper=upper)
-        ends = [self._end(cell, row, sense) for row in here]
-        return max(ends) if sense > 0.0 else min(ends)
+    def _all_ranges(self, problem: SolverInput, sweep: Sweep | None) -> Array:
+        """The values ``(k, 2)`` of the given joint at which any solution is inside the limits."""
+        p, i = problem, self.given
+        motions = (sweep or self.sweeper.sweep(p)).motions
+        if motions.joint != i:
+            motions = Motions(self.robot, p, i, motions.inner)
+        ranges, least, most = motions.ranges, float(p.lower[i]), float(p.upper[i])
+        if not len(ranges):
+            return ranges
+        if not most - least < UNBOUNDED:
+            least, most = turn_around(least, most, float(p.seed[i]))
+        first, last = math.floor((least - ranges.max()) / TURN), math.ceil((most - ranges.min()) / TURN)
+        turned = (ranges + TURN * np.arange(first, last + 1)[:, None, None]).reshape(-1, 2)
+        return np.clip(turned[(turned[:, 0] <= most) & (turned[:, 1] >= least)], least, most)
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(7,)`` among all solutions of its pose with the same value of the given joint."""

@@ -73,17 +73,16 @@ def nearest_on_motion(
 
 
 @jit
-def to_images(q: Array, seed: Array, lower: Array, upper: Array, joint: int, squares: Array) -> None:
+def to_images(q: Array, seed: Array, lower: Array, upper: Array, squares: Array) -> None:
     """Bring configurations q ``(k, 7)``, in place, to the whole turns inside the limits nearest to the seed.
 
-    The given joint stays. squares ``(k,)`` ← the squared distance from the seed; infinity for those that do not
+    squares ``(k,)`` ← the squared distance from the seed; infinity for those that do not
     exist or are outside the limits.
     """
     for k in range(q.shape[0]):
         squares[k] = 0.0 if q[k, 0] == q[k, 0] else math.inf
         for i in range(7):
             if squares[k] < math.inf:
-                if i != joint:
-                    q[k, i] = nearest_image(q[k, i], seed[i], lower[i], upper[i])
+                q[k, i] = nearest_image(q[k, i], seed[i], lower[i], upper[i])
                 outside = q[k, i] < lower[i] - _LIMIT or q[k, i] > upper[i] + _LIMIT
                 squares[k] += math.inf if outside else (q[k, i] - seed[i]) ** 2

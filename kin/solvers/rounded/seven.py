@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from kin.angles import TURN, apart, wrapped
 from kin.axes import size
 from kin.fk import fk, jacobian
-from kin.kernels.compile import MODEL, direct, record, row_of
+from kin.kernels.compile import MODEL, direct
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
@@ -28,8 +28,8 @@ from kin.solvers.reversed import ReversedJoints, WrappedKernels
 from kin.solvers.rounded.closed_form import Flags, Rounded
 from kin.solvers.rounded.ends import joined, move_ends
 from kin.solvers.rounded.rows import choose_rows, move_rows
+from kin.solvers.selfmotion.following import Followed
 from kin.solvers.selfmotion.points import FRAME, JOINT, MOST, OFF, SETTING, SPAN, WANTED, set_frame
-from kin.solvers.selfmotion.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -116,7 +116,7 @@ class Rounded7(Rounded):
         p = SolverInput(fk(self.robot, q), POSE, _FREE, True, q, self.robot.lower.copy(), self.robot.upper.copy())
         self.solve(p)
         self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
-        found = _Found()
+        found = Followed()
         found.follow(self.robot.model, p.T, self._set(p), self._widened(p), self._move, np.array([q]))
 
     def _in_one_turn(self, problem: SolverInput) -> SolverInput:
@@ -291,7 +291,7 @@ class Rounded7(Rounded):
         """
         sure = moved[2][moved[0][:, 0].astype(int)] > 0.0
         arcs, places, certain = [(a, b, c) for a, b, c in moved[0][sure].tolist()], list(moved[1][sure]), True
-        found = _Found()
+        found = Followed()
         for intervals, shares in ((inner, _MIDDLE), (outer, _SHARES)):
             doubtful = intervals[moved[2][intervals[:, 0].astype(int)] == 0.0]
             values = (doubtful[:, 1:2] + shares * (doubtful[:, 2:] - doubtful[:, 1:2])).ravel().tolist()
@@ -387,25 +387,6 @@ class Rounded7(Rounded):
         return WrappedKernels(form.params, one, many, self._kernels, form)
 
 
-class _Found:
-    """What following the curves of one target finds, and the curves."""
-
-    def __init__(self) -> None:
-        self.pieces, self.postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
-        self._paths = Paths(np.empty((PATHS, 14)), np.zeros(1 + CURVES, dtype=np.int64))
-
-    def follow(
-        self, model: Array, T: Array, setting: Array, limits: Array, margin: float, starts: Array
-    ) -> tuple[int, Flags]:
-        """How many pieces of the curves through postures ``(k, 7)`` are now in `pieces` and `postures`.
-
-        Also returns ``(k,)`` which curves were lost, see `trace`.
-        """
-        goal, starts = (model, T, setting, limits, margin), starts.copy()
-        count = _trace()(*goal, starts, self._paths, self.pieces, self.postures)
-        return count, np.isnan(starts[:, 0])
-
-
 def _merged(rows: Array) -> Flags:
     """Which of the rows ``(8, 7)``, NaN where a branch has none, are the posture of another branch, too."""
     return np.asarray((apart(rows[:, None], rows) < _SAME).sum(axis=1) > 1)
@@ -451,9 +432,3 @@ def _ends() -> Callable[..., None]:
 def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int]:
     """`choose_rows` without type dispatch."""
     return direct(choose_rows, MODEL, (4, 4), 1, 2, 2, 3, 2)
-
-
-@cache
-def _trace() -> Callable[..., int]:
-    """`trace` without type dispatch."""
-    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(Paths, 2, row_of(int)), 2, 3)

@@ -9,6 +9,7 @@ import kin
 from kin.calibration.chain import Chain
 from kin.collision.bodies import bodies_of
 from kin.robot import NominalTable
+from kin.solvers import closed_form_of
 from tests.kin.calibration.simulated import random_errors
 
 
@@ -67,6 +68,25 @@ def test_postures_have_the_names_of_the_nominal_arm(arms):
         assert best.branch == kin.branch_of(robot, q) == kin.branch_of(made, q)
         only = kin.solve_ik(made, kin.fk(made, q), task=task, q_seed=q, branch=best.branch)
         assert {each.branch for each in only.solutions} == {best.branch}
+
+
+@pytest.mark.full
+def test_all_values_of_a_calibrated_panda_are_agreed():
+    """Few values of joint 1 and the nominal arm lead to all that 400 values of joint 7 have."""
+    robot, made = calibrated("panda")
+    form = closed_form_of(made)
+    assert (form.given, form.sweeper.given) == (6, 0)
+    values = np.linspace(made.lower[6], made.upper[6], 402)[1:-1]
+    for q in robot.random_q(np.random.default_rng(6), 12):
+        T = kin.fk(made, q)
+        result = kin.solve_ik(made, T)
+        rows = np.empty((len(values), len(form.branches), 7))
+        form.kernels.many(form.kernels.params, np.tile(T, (len(values), 1, 1)), values, q, rows)
+        inside = ((rows - made.lower) % (2.0 * np.pi) <= made.upper - made.lower).all(axis=2)
+        (parameter,) = result.redundancy
+        claimed = [any(low <= value <= high for low, high in parameter.intervals) for value in values]
+        assert (result.completeness, parameter.name) == ("agreed", "theta7")
+        assert np.array_equal(inside.any(axis=1), claimed)
 
 
 def test_another_tool_is_one_of_the_nominal_arm_too():

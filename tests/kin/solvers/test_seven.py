@@ -114,6 +114,10 @@ def test_the_spelling_of_a_table_does_not_matter():
 # -- ranges -------------------------------------------------------------------------------------------------------
 
 
+def problem_at(robot, T):
+    return SolverInput(T, POSE, (math.nan,), True, robot.q_home, robot.lower, robot.upper)
+
+
 def candidates(robot, T, seed, value=math.nan, respect=True):
     return closed_form_of(robot).solve(SolverInput(T, POSE, (value,), respect, seed, robot.lower, robot.upper))
 
@@ -259,7 +263,9 @@ def test_an_answer_has_every_configuration_at_the_value_of_the_seed(robot):
         q = robot.random_q(rng)
         result = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q)
         assert (result.status, result.solver) == (Status.SOLVED, form.name)
-        assert (result.completeness, result.complete) == ("searched", False)
+        assert (result.completeness, result.complete) == (
+            ("agreed", True) if robot is SAWYER else ("searched", False)
+        )
         value = float(q[form.redundancies(POSE)[0].joint])
         assert kin.solve_ik(robot, kin.fk(robot, q), q_seed=q, redundancy=value).complete
         assert np.abs(result.solutions[0].q - q).max() < 1e-8
@@ -306,6 +312,40 @@ def test_the_ranges_of_a_result_are_those_of_all_branches():
             further += exists and not any(low <= value <= high for low, high in own)
     assert disagree == 0
     assert further > 100  # values that the ranges of the best posture alone do not have
+
+
+def test_what_is_agreed_is_all_that_a_scan_finds():
+    """At 300 values, which share no following of self-motions with the answer."""
+    form, rng = closed_form_of(SAWYER), np.random.default_rng(12)
+    values = np.linspace(SAWYER.lower[6], SAWYER.upper[6], 302)[1:-1]
+    for q in SAWYER.random_q(rng, 4):
+        T = kin.fk(SAWYER, q)
+        result, motions = kin.solve_ik(SAWYER, T), form.sweep(problem_at(SAWYER, T)).motions
+        rows = kin.ik_branches(SAWYER, np.broadcast_to(T, (len(values), 4, 4)), values)
+        inside = ((rows - SAWYER.lower) % (2 * PI) <= SAWYER.upper - SAWYER.lower).all(axis=2)
+        claimed = [any(low <= value <= high for low, high in result.redundancy[0].intervals) for value in values]
+        assert result.completeness == "agreed"
+        assert np.array_equal(inside.any(axis=1), claimed)
+        assert np.array_equal(inside.sum(axis=1), motions.counts(values))
+        assert motions.have(np.ascontiguousarray(rows[inside]))
+
+
+def test_what_only_one_of_two_ways_finds_is_not_agreed(monkeypatch):
+    T = kin.fk(SAWYER, SAWYER.random_q(np.random.default_rng(12)))
+    form, asked = closed_form_of(SAWYER), problem_at(SAWYER, T)
+    assert form.solve(asked).completeness == "agreed"
+    solved = form._at
+
+    def with_a_gap(problem, values):
+        rows = solved(problem, values)
+        rows[3:-3:5] = math.nan
+        return rows
+
+    monkeypatch.setattr(form, "_at", with_a_gap)
+    assert form.solve(asked).completeness == "searched"
+    monkeypatch.setattr(form, "_at", solved)
+    monkeypatch.setattr(general7.closed_form, "_VALUES", 1)  # the motions through few solutions are not all
+    assert form.solve(asked).completeness == "searched"
 
 
 @pytest.mark.parametrize("row", [8, 20])
@@ -359,7 +399,10 @@ def test_an_approach_direction_leaves_two_parameters(robot):
         q = robot.random_q(rng)
         T = kin.fk(robot, q)
         result = kin.solve_ik(robot, T, task="approach", q_seed=q)
-        assert (result.status, result.completeness) == (Status.SOLVED, "searched")
+        assert (result.status, result.completeness) == (
+            Status.SOLVED,
+            "agreed" if robot is SAWYER else "searched",
+        )
         assert [r.name for r in result.redundancy] == [first, "theta7"]
         assert np.abs(result.solutions[0].q - q).max() < 1e-6
         for s in result.solutions:
