@@ -19,13 +19,13 @@ from kin.solvers.common import UNBOUNDED
 from kin.solvers.contract import POSE
 from kin.solvers.coupled import APART
 from kin.solvers.general6.batch import PROVED
-from kin.solvers.general6.closed_form import MET, SAME
+from kin.solvers.general6.closed_form import COPIES, MET, SAME
 from kin.solvers.numeric import each_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 Limits = tuple[Array, Array]  # lower and upper
-_AT_ZERO = TOLERANCES.near_miss
+_AT_ZERO, _CLOSURE = TOLERANCES.near_miss, TOLERANCES.closure_position
 _REGULAR = 1e-4  # pivot of the Jacobian of a regular solution
 
 
@@ -83,6 +83,14 @@ def of_general6(
     known: int = other.rows(other.inner, params, T, value, near, limits, arcs, q)
     if known == 0 - PROVED:
         return 0
+    _merge_copies(other, T, q, _add_nearby(other, params, T, value, near, limits, arcs, q))
+    return 0
+
+
+def _add_nearby(
+    other: Constants, params: Array, T: Array, value: float, near: Array, limits: Limits, arcs: Array, q: Array
+) -> int:
+    """Add to q ``(16, 6)`` what targets close by lead to; how many rows there are then."""
     size, step, pose, J = q.shape[0], np.empty((4, 4)), np.empty((4, 4)), np.empty((6, 6))
     rows, costs, mask, turns = np.empty((size, 6)), np.empty(size), np.zeros(7), np.zeros(6)
     low, high = np.full(6, -UNBOUNDED), np.full(6, UNBOUNDED)
@@ -107,7 +115,32 @@ def of_general6(
                     for j in range(6):
                         q[count, j] = wrap(rows[i, j]) if other.turns[j] != 0.0 else rows[i, j]
                     count += 1
-    return 0
+    return count
+
+
+def _merge_copies(other: Constants, T: Array, q: Array, count: int) -> None:
+    """Make those of the first rows of q into which rounding splits a multiple solution one, as `General6` does."""
+    middle, pose = np.empty(6), np.empty((4, 4))
+    for k in range(1, count):
+        copy, least = -1, _CLOSURE
+        for i in range(k):
+            apart = 0.0
+            for j in range(6):
+                off = q[i, j] - q[k, j]
+                off = wrap(off) if other.turns[j] != 0.0 else off
+                middle[j] = q[k, j] + 0.5 * off
+                apart = max(apart, abs(off))
+            if apart < COPIES:
+                fk_into(other.model, middle, pose)
+                miss = 0.0
+                for r in range(3):
+                    for j in range(4):
+                        miss = max(miss, abs(pose[r, j] - T[r, j]))
+                if miss < least:
+                    copy, least = i, miss
+        if copy >= 0:
+            for j in range(6):
+                q[k, j] = q[copy, j]
 
 
 def _counted(rows: Array) -> int:

@@ -60,7 +60,7 @@ STEPS = tuple(
 )
 MET, SAME = 1e-10, 1e-6
 _JOINTS = np.arange(6)
-_COPIES = 1e-3  # rad, m: farther apart are no copies of one solution, whatever its multiplicity
+COPIES = 1e-3  # rad, m: farther apart are no copies of one solution, whatever its multiplicity
 SolveAll = Callable[[Array, Array, Array], int]
 # Beside curves: random starts of each of two searches, rows that are compared.
 _STARTS, _MOST_ROWS = 40, 60
@@ -209,7 +209,7 @@ class General6(ClosedForm):
         """
         turns, rows = self.robot.revolute, np.flatnonzero(~np.isnan(q[:, 0])).tolist()
         for k, i in enumerate(rows):
-            close = [j for j in rows[:k] if apart(q[j], q[i], turns) < _COPIES]
+            close = [j for j in rows[:k] if apart(q[j], q[i], turns) < COPIES]
             off = np.where(turns, wrapped(q[close] - q[i]), q[close] - q[i])
             miss = np.abs(fk(self.robot, q[i] + 0.5 * off) - T).max(axis=(1, 2), initial=0.0)
             if (miss < TOLERANCES.closure_position).any():

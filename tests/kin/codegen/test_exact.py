@@ -90,6 +90,21 @@ def test_targets_close_by_lead_to_what_the_elimination_misses():
     assert np.abs(off).max(axis=2).min(axis=0).max() < 1e-7
 
 
+def test_copies_of_a_multiple_solution_are_one():
+    robot = builtin_robots()["gofa"]  # at home, moved almost onto axis 1: rounding splits the roots
+    found, T, close = alone(robot, closed_form_of(robot)), fk(robot, robot.q_home), []
+    T[:2, 3] *= 1e-9
+    limits, arcs = (robot.lower, robot.upper), np.empty((256, 3))
+    for each in (found.inner, found):
+        q = np.empty((16, 6))
+        each.rows(each.inner, found.params, T, math.nan, robot.q_home, limits, arcs, q)
+        q = q[~np.isnan(q[:, 0])]
+        apart = np.abs((q[:, None] - q + math.pi) % (2.0 * math.pi) - math.pi).max(axis=2)
+        close.append(int(((apart > 1e-7) & (apart < 1e-3)).sum()))
+    assert close[0] > close[1] == 0
+    assert len(np.unique(q, axis=0)) > 4
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("robot_id", ALL)
 def test_c_is_also_strict_cpp_and_clean_under_sanitizers(robot_id, tmp_path):
