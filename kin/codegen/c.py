@@ -56,11 +56,17 @@ RUNTIME = (Path(__file__).parent / "runtime.h").read_text(encoding="utf-8")
 HEAP = """\
 #include <stdlib.h>
 typedef struct { void *p; size_t size; } block; // of all zeros: nothing is taken
-static inline void *taken(block *b, size_t size) {
-  if (b->p == NULL || b->size < size) {
+#ifndef KINBOARD_NO_MEMORY
+#define KINBOARD_NO_MEMORY abort()
+#endif
+static inline void *taken(block *b, double size) { // of bytes: products of integers might overflow
+  if (!(size >= 0.0 && size < 9007199254740992.0)) KINBOARD_NO_MEMORY;
+  if (b->p == NULL || b->size < (size_t)size) {
     free(b->p);
-    b->p = malloc(b->size = size > 0 ? size : 1);
-    if (b->p == NULL) abort();
+    b->size = 0;
+    b->p = malloc(size > 0.0 ? (size_t)size : 1);
+    if (b->p == NULL) KINBOARD_NO_MEMORY;
+    b->size = (size_t)size;
   }
   return b->p;
 }
@@ -223,8 +229,9 @@ class C(Emitter):
 
     def new(self, value: New) -> str:
         assert isinstance(value.kind, ArrayOf)
-        item, count = value.kind.item, " * ".join(self.text(each, MULTIPLY) for each in value.shape)
-        place = self.room(value, item, f"sizeof({NAMES[item]}) * (size_t)({count})")
+        item, sizes = value.kind.item, [self.text(each, MULTIPLY) for each in value.shape]
+        count = " * ".join(sizes)
+        place = self.room(value, item, " * ".join([f"sizeof({NAMES[item]})", *(f"(double)({n})" for n in sizes)]))
         if value.fill is not None:
             place = f"filled_{LETTERS[item]}({place}, {count}, {self.text(value.fill)})"
         return self.of(value.kind, place, map(self.text, value.shape))
@@ -234,7 +241,7 @@ class C(Emitter):
         item, array = value.kind.item, self.text(value.array, ATOM)
         sizes = [self.length(value.array, k) for k in range(value.kind.ndim)]
         size = f"sizeof({NAMES[item]}) * (size_t)({' * '.join(sizes)})"
-        place = self.room(value, item, size)
+        place = self.room(value, item, f"(double)({size})")
         return self.of(value.kind, f"({NAMES[item]} *)copied({place}, {array}.p, {size})", sizes)
 
     def reshaped(self, value: Reshaped) -> str:

@@ -35,7 +35,7 @@ import uuid
 import warnings
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,7 @@ from kin.kernels.private import (
     rebuild_environment,
     rtsys,
 )
+from kin.kernels.sources import fingerprint, user_folder
 
 CAPACITY = 512 << 20  # bytes; all kernels of one version take 25 MB
 _DAY = 86400.0  # s: a file that is used says so at most once a day
@@ -63,39 +64,7 @@ _OPTIONS = (
     "BOUNDSCHECK",
     "DEBUGINFO_DEFAULT",
 )  # they change machine code
-_ROOT = str(Path(__file__).parents[2])
 _LEVEL = 4  # of compression: higher ones take longer and save 2 % more
-_IMPORT = re.compile(r"^from (kin[\w.]*) import (?:\(([^)]*)\)|([^(\n]*))", re.MULTILINE)
-
-
-@cache
-def fingerprint(file: str) -> str:
-    """Hash of the text of a Python file and of all modules of the core that it imports, directly or not."""
-    found, waiting = {file}, [file]
-    while waiting:
-        new = _read(waiting.pop())[1] - found
-        found |= new
-        waiting += new
-    return hashlib.blake2b(b"".join(sorted(_read(each)[0] for each in found)), digest_size=16).hexdigest()
-
-
-@cache
-def _read(file: str) -> tuple[bytes, frozenset[str]]:
-    """Hash of the text of a file, and the files of the core that it imports at its top level."""
-    text = Path(file).read_text(encoding="utf-8")
-    imports = set()
-    for module, several, one in _IMPORT.findall(text):
-        place = _file_of(module)
-        names = [name.split()[0] for name in (several or one).split(",") if name.split()]
-        imports |= {place, *(_file_of(f"{module}.{name}") for name in names)} - {None, __file__}
-    return hashlib.blake2b(text.encode(), digest_size=16).digest(), frozenset(map(str, imports))
-
-
-@cache
-def _file_of(module: str) -> str | None:
-    """The file of a module or package of the core; None for another name. Plain strings: `Path` takes longer."""
-    place = os.path.join(_ROOT, *module.split("."))  # noqa: PTH118
-    return next((file for file in (f"{place}.py", f"{place}/__init__.py") if os.path.isfile(file)), None)  # noqa: PTH113
 
 
 def kernel_folder() -> Path | None:
@@ -120,17 +89,6 @@ def kernel_folder() -> Path | None:
         _warn(f"{folder} may be changed or read by others ({owned}) and is not used: chmod 700, or {hint}")
         return None
     return folder
-
-
-def user_folder() -> Path:
-    """The user's cache folder for Kinboard, that of `platformdirs`, which the core does without."""
-    if named := os.environ.get("KINBOARD_CACHE"):
-        return Path(named)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "kinboard" / "Cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "kinboard"
-    return Path(os.environ.get("XDG_CACHE_HOME", "").strip() or Path.home() / ".cache") / "kinboard"
 
 
 def prune(folder: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from kin.kernels import cache as compiling
+from kin.kernels import sources
 
 FILES = {
     "kin/kernel.py": "from kin.solver import solve\nfrom kin import constants\n",
@@ -17,14 +17,14 @@ KERNEL = "kin/kernel.py"
 
 
 def forget() -> None:
-    for found in (compiling.fingerprint, compiling._read, compiling._file_of):
+    for found in (sources.fingerprint, sources._read, sources.file_of):
         found.cache_clear()
 
 
 @pytest.fixture
 def changed(tmp_path, monkeypatch):
     """A function that writes `FILES` with one changed, and returns the fingerprint of the kernel's file."""
-    monkeypatch.setattr(compiling, "_ROOT", str(tmp_path))
+    monkeypatch.setattr(sources, "_ROOT", str(tmp_path))
 
     def fingerprint(changed: str | None = None) -> str:
         for name, text in FILES.items():
@@ -32,7 +32,7 @@ def changed(tmp_path, monkeypatch):
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text + "# changed\n" * (name == changed))
         forget()
-        return compiling.fingerprint(str(tmp_path / KERNEL))
+        return sources.fingerprint(str(tmp_path / KERNEL))
 
     yield fingerprint
     forget()

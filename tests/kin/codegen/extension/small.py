@@ -1,0 +1,85 @@
+"""Small kernels for an extension: every kind of argument and of result, and nothing else."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, SINGLE, WORD, ArrayOf, TupleOf
+from kin.codegen.units import Entry
+
+
+class Box(NamedTuple):
+    low: np.ndarray
+    high: np.ndarray
+    side: float
+
+
+def numbers(x, k, flag, z):
+    return 2.0 * x, k + 1, not flag, z * z
+
+
+def nothing(x):
+    pass
+
+
+def scaled(a, x, out):
+    for i in range(a.shape[0]):
+        out[i] = a[i] * x
+    return a.shape[0]
+
+
+def last(a):
+    return a[a.shape[0] - 1, a.shape[1] - 1]
+
+
+def counts(a, flags, words, singles, out):
+    for i in range(a.shape[0]):
+        if flags[i]:
+            out[i] = a[i]
+            words[i] = words[i] + np.uint64(1)
+            singles[i] = np.float32(2.0)
+
+
+def inside(box, q, notes):
+    low, high, side = box
+    for i in range(q.shape[0]):
+        notes[i] = low[i] - side <= q[i] and q[i] <= high[i] + side
+
+
+def ramp(n, x):
+    found = np.empty((n, 2))
+    for i in range(n):
+        found[i, 0], found[i, 1] = x, 1.0 * i
+    return found
+
+
+def pair(a):
+    other = a.copy()
+    other[0] = -1.0
+    return other, a.shape[0]
+
+
+def wait(a, n):
+    k = 0
+    while k < n and a[0] == 0.0:
+        k += 1
+    return k
+
+
+F1, F2 = ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2)
+KINDS = {
+    numbers: (FLOAT, INT, BOOL, COMPLEX),
+    nothing: (FLOAT,),
+    scaled: (F1, FLOAT, F1),
+    last: (F2,),
+    counts: (ArrayOf(INT, 1), ArrayOf(BOOL, 1), ArrayOf(WORD, 1), ArrayOf(SINGLE, 1), ArrayOf(INT, 1)),
+    inside: (TupleOf((F1, F1, FLOAT), Box._fields), F1, ArrayOf(BOOL, 1)),
+    ramp: (INT, FLOAT),
+    pair: (F1,),
+    wait: (F1, INT),
+}
+for _kernel in KINDS:
+    _kernel.__module__ = "kin.small"  # names in C are those of modules of the core
+ENTRIES = [Entry(kernel, kinds) for kernel, kinds in KINDS.items()]
