@@ -11,17 +11,12 @@ axes, shape, order and alignment that the kernel is compiled for. Any other obje
 addresses of `numpy.ndarray` and of the data type are symbols, resolved when machine code is loaded, so that code
 from the cache is valid in every process.
 
-NumPy 2 promises these places, and a wrong one would read the memory of something else. So they are compared with
-what NumPy says of some arrays when this module is imported. Where they differ, and without a GIL, `READABLE` is
-false: `kin.kernels.compile.direct` then passes arrays as numba does, and compares them in Python.
+Where NumPy has the fields elsewhere (:mod:`kin.kernels.layout`), `READABLE` is false: `kin.kernels.compile.direct`
+then passes arrays as numba does, and compares them in Python.
 """
 
 from __future__ import annotations
 
-import ctypes
-import sysconfig
-import warnings
-from collections.abc import Iterator
 from functools import reduce
 from typing import Any
 
@@ -29,14 +24,10 @@ import numpy as np
 from llvmlite import binding, ir
 from numba import types
 
+from kin.kernels import layout
 from kin.kernels.private import CALLS, MISSING, NativeValue, cgutils, lower_cast, models, register_model, unbox
-from kin.transforms import is_plain
 
 _FLOAT = np.dtype(np.float64)
-_WORD = np.dtype(np.intp).itemsize
-# Offsets of the fields. The type is the last field of the head that all Python objects have.
-_DATA = object.__basicsize__
-_TYPE, _AXES, _SHAPE, _STRIDES, _DTYPE, _FLAGS = (_DATA + k * _WORD for k in (-1, 1, 2, 3, 5, 6))
 _CONTIGUOUS_AND_ALIGNED = 0x0001 | 0x0100  # NPY_ARRAY_C_CONTIGUOUS, NPY_ARRAY_ALIGNED
 _SYMBOLS = {"kin.ndarray": np.ndarray, "kin.float64": _FLOAT}
 
@@ -44,51 +35,7 @@ for _name, _object in _SYMBOLS.items():
     binding.add_symbol(_name, id(_object))
 
 
-def _probes() -> Iterator[np.ndarray[Any, Any]]:
-    """Arrays of all data types and layouts that matter."""
-    block = np.arange(120.0).reshape(2, 3, 4, 5)
-    yield from (block, block[0, 0], block[1:, ::2, ::-1], block.T, np.asfortranarray(block), np.array(1.5))
-    yield from (block.astype(kind) for kind in ("f4", ">f8", "i4", "i8", "?", "c16", "O", "M8[s]"))
-    yield np.ndarray(3, np.float64, np.zeros(25, np.uint8), 1)  # unaligned
-    fixed = np.zeros((4, 4))
-    fixed.flags.writeable = False
-    yield fixed
-
-
-def _unreadable() -> str:
-    """Why the fields of arrays cannot be read in this process; empty if they can."""
-    if sysconfig.get_config_var("Py_GIL_DISABLED"):
-        return "this Python has no GIL, so that arrays may change while they are read"
-    if np.ndarray.__basicsize__ < max(_TYPE, _AXES, _SHAPE, _STRIDES, _DTYPE, _FLAGS) + _WORD:
-        return "its arrays are shorter"
-    for array in _probes():
-
-        def word(offset: int, of: Any = ctypes.c_size_t, array: Any = array) -> int:
-            return int(of.from_address(id(array) + offset).value)
-
-        there = {
-            "type": word(_TYPE) == id(np.ndarray),
-            "address": word(_DATA) == array.ctypes.data,
-            "number of axes": word(_AXES, ctypes.c_int) == array.ndim,
-            "data type": word(_DTYPE) == id(array.dtype),
-            "flags": word(_FLAGS, ctypes.c_int) == array.flags.num,
-            # NumPy keeps both in one block. Unless this holds, they are not followed: they may lead anywhere.
-            "shape": array.ndim == 0 or word(_STRIDES) - word(_SHAPE) == array.ndim * _WORD,
-        }
-        if all(there.values()) and array.ndim:
-            lengths = ctypes.c_ssize_t * array.ndim
-            there["shape"] = tuple(lengths.from_address(word(_SHAPE))) == array.shape
-            there["strides"] = tuple(lengths.from_address(word(_STRIDES))) == array.strides
-        if elsewhere := [name for name, is_there in there.items() if not is_there]:
-            return f"its arrays have another {elsewhere[0]} where that of NumPy 2 is"
-    return ""
-
-
-if _why := _unreadable():
-    warnings.warn(
-        f"NumPy {np.__version__}: {_why}. Calls of kernels take longer, with the same answers.", stacklevel=2
-    )
-READABLE = not _why and CALLS not in MISSING
+READABLE = layout.READABLE and CALLS not in MISSING
 
 
 class Borrowed(types.Array):
@@ -117,12 +64,6 @@ class Borrowed(types.Array):
         """The type that functions called by compiled code have for the same array."""
         return types.Array(self.dtype, self.ndim, "C", readonly=not self.mutable)
 
-    def fits(self, value: object) -> bool:
-        """Whether a Python object is such an array: what machine code decides, for plain functions."""
-        if not is_plain(value) or value.ndim != self.ndim:
-            return False
-        return all(wanted in (None, there) for wanted, there in zip(self.wanted, value.shape, strict=True))
-
 
 def _lend(context: Any, builder: Any, borrowed: Borrowed, owned: types.Array, value: Any) -> Any:
     """The same array for a function that is called by compiled code."""
@@ -149,22 +90,22 @@ def _borrow(kind: Borrowed, array: Any, c: Any) -> NativeValue:
 
     result = cgutils.alloca_once_value(builder, c.context.get_constant_null(kind))
     failed = cgutils.alloca_once_value(builder, cgutils.true_bit)
-    with builder.if_then(is_symbol(_TYPE, "kin.ndarray"), likely=True):
-        flags = builder.and_(field(_FLAGS, int32), int32(_CONTIGUOUS_AND_ALIGNED))
-        right = is_symbol(_DTYPE, "kin.float64")
+    with builder.if_then(is_symbol(layout.TYPE, "kin.ndarray"), likely=True):
+        flags = builder.and_(field(layout.FLAGS, int32), int32(_CONTIGUOUS_AND_ALIGNED))
+        right = is_symbol(layout.DTYPE, "kin.float64")
         right = builder.and_(right, builder.icmp_signed("==", flags, int32(_CONTIGUOUS_AND_ALIGNED)))
-        right = builder.and_(right, builder.icmp_signed("==", field(_AXES, int32), int32(kind.ndim)))
+        right = builder.and_(right, builder.icmp_signed("==", field(layout.AXES, int32), int32(kind.ndim)))
         with builder.if_then(right, likely=True):
-            shape = numbers(_SHAPE)
+            shape = numbers(layout.SHAPE)
             for there, wanted in zip(shape, kind.wanted, strict=True):
                 if wanted is not None:
                     right = builder.and_(right, builder.icmp_signed("==", there, intp(wanted)))
             with builder.if_then(right, likely=True):
                 native = cgutils.create_struct_proxy(kind)(c.context, builder)  # other fields are zero
-                native.data = builder.bitcast(field(_DATA, address), native.data.type)
+                native.data = builder.bitcast(field(layout.DATA, address), native.data.type)
                 native.itemsize, native.nitems = intp(_FLOAT.itemsize), reduce(builder.mul, shape, intp(1))
                 native.shape = cgutils.pack_array(builder, shape, intp)
-                native.strides = cgutils.pack_array(builder, numbers(_STRIDES), intp)
+                native.strides = cgutils.pack_array(builder, numbers(layout.STRIDES), intp)
                 builder.store(native._getvalue(), result)
                 builder.store(cgutils.false_bit, failed)
     with builder.if_then(builder.load(failed), likely=False):

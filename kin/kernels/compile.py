@@ -1,30 +1,45 @@
 """Compile kernels, and call them without dispatch.
 
-Their machine code is cached on disk (:mod:`kin.kernels.cache`). Where numba lacks what these modules use of it
-(:mod:`kin.kernels.private`), kernels are cached and called as numba does by itself.
+What a kernel is follows from KINBOARD_KERNELS (:mod:`kin.kernels.ahead`). The machine code of numba is cached on
+disk (:mod:`kin.kernels.cache`). Where numba lacks what these modules use of it (:mod:`kin.kernels.private`),
+kernels are cached and called as numba does by itself.
 
-With NUMBA_DISABLE_JIT=1 kernels are plain Python functions, which is faster for a command that computes one pose.
+With KINBOARD_KERNELS=python, or NUMBA_DISABLE_JIT=1, kernels are plain Python functions, which is faster for a
+command that computes one pose.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
-from functools import partial
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
-from numba import config, njit, types
+from kin.kernels import ahead
+from kin.kernels.ahead import CHOSEN, NUMBA, PYTHON, C, Wanted
 
-from kin.kernels.arguments import READABLE, Borrowed
-from kin.kernels.cache import KernelCache, numbas_own
-from kin.kernels.private import CACHE, CALLS, MISSING
+if CHOSEN == NUMBA:
+    from numba import config, njit, types
+
+    from kin.kernels import cache
+    from kin.kernels.arguments import READABLE, Borrowed
+    from kin.kernels.cache import KernelCache, numbas_own
+    from kin.kernels.private import CACHE, CALLS, MISSING
 
 MODEL = "model"
-PLAIN = bool(vars(config)["DISABLE_JIT"])
+PLAIN = CHOSEN == PYTHON or (CHOSEN == NUMBA and bool(vars(config)["DISABLE_JIT"]))
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 
 
+class Record(NamedTuple):
+    """A named tuple as an argument of `direct`."""
+
+    cls: type
+    fields: tuple[Any, ...]
+
+
 def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
+    if CHOSEN == C:
+        return cast(_Kernel, ahead.Kernel(function))
     if PLAIN:
         return function
     with numbas_own(function) if kept and CACHE in MISSING else nullcontext(False) as cached:
@@ -35,7 +50,7 @@ def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
         return cast(_Kernel, kernel)
     template = kernel.get_call_template
 
-    def plain(arguments: tuple[types.Type, ...], keywords: dict[str, types.Type]) -> Any:
+    def plain(arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
         """Compile a callee once, not again for every constant or borrowed array passed to it."""
         return template(tuple(map(_settled, arguments)), {k: _settled(v) for k, v in keywords.items()})
 
@@ -83,58 +98,77 @@ def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
         The function. It raises `TypeError` for an array argument that is not as described: callers need not check
         it, and deal with whatever else they accept when that happens.
     """
-    wanted = tuple(map(_argument, arguments))
+    if CHOSEN == C:
+        return ahead.direct(kernel, list(_wanted(arguments)))
     if PLAIN or CALLS in MISSING:
-        return partial(_checked, kernel, wanted)
-    passed = wanted if READABLE else tuple(map(_settled, wanted))
+        return ahead.checked(kernel, list(_wanted(arguments)))
+    passed = tuple(map(_argument if READABLE else _type_of, arguments))
     entry: Callable[..., Any] = kernel.compile(passed)
     returned = kernel.overloads[passed].signature.return_type
     if not isinstance(returned, types.Number | types.Boolean | types.NoneType):
         raise TypeError(f"{kernel} returns {returned}, which might be a part of a borrowed array")
-    return entry if READABLE else partial(_checked, entry, wanted)
+    return entry if READABLE else ahead.checked(entry, list(_wanted(arguments)))
 
 
-def _checked(kernel: Callable[..., Any], wanted: tuple[Any, ...], *arguments: Any) -> Any:
-    """A function called with the checks that compiled code makes of borrowed arrays."""
-    for kind, value in zip(wanted, arguments, strict=True):
-        if isinstance(kind, Borrowed) and not kind.fits(value):
-            raise TypeError(f"{value!r} is not {kind}")
-    return kernel(*arguments)
+def is_cached(kernel: Any) -> bool:
+    """Whether a kernel need not be compiled before it is called."""
+    return CHOSEN != NUMBA or cache.is_cached(kernel)
 
 
-def counted(axes: int) -> Any:
-    """The type of an array that is neither borrowed nor checked, for `direct`: that of calls with dispatch."""
-    return _type_of(axes)
+def counted(axes: int) -> Wanted:
+    """An array that is neither borrowed nor checked, for `direct`: that of calls with dispatch."""
+    return Wanted((None,) * axes, checked=False)
 
 
-def row_of(kind: type) -> Any:
-    """The type of an array with one axis of `int` or `bool` values, for `record`."""
-    return types.Array(_NUMBERS[kind], 1, "C")
+def row_of(kind: type) -> Wanted:
+    """An array with one axis of `int` or `bool` values, for `record`."""
+    return Wanted((None,), checked=False, item=kind)
 
 
-def record(cls: type, *fields: Any) -> Any:
-    """The type of a named tuple `cls`; its fields are numbers of axes, `MODEL`, types of numbers or `row_of`."""
-    return types.NamedTuple(tuple(map(_type_of, fields)), cls)
+def record(cls: type, *fields: Any) -> Record:
+    """A named tuple `cls`, for `direct`; its fields are numbers of axes, `MODEL`, types of numbers or `row_of`."""
+    return Record(cls, fields)
 
 
-_NUMBERS: dict[type, Any] = {float: types.float64, int: types.int64, bool: types.boolean}
+def _wanted(arguments: tuple[Any, ...]) -> Iterator[Wanted | None]:
+    """The arrays among the arguments of `direct`, and None for each number."""
+    for argument in arguments:
+        match argument:
+            case Record(_, fields):
+                yield from (each and each._replace(checked=False) for each in _wanted(fields))
+            case Wanted():
+                yield argument
+            case type():
+                yield None
+            case tuple():
+                yield Wanted(argument)
+            case _:
+                yield Wanted((None,) * (1 if argument == MODEL else argument))
 
 
 def _type_of(argument: Any) -> Any:
-    if isinstance(argument, types.Type):
-        return argument
-    if argument == MODEL:
-        return types.Array(types.float64, 1, "C", readonly=True)
-    if isinstance(argument, type):
-        return _NUMBERS[argument]
-    return types.Array(types.float64, argument, "C")
+    """The type of numba with which an argument is passed as numba does."""
+    numbers = {float: types.float64, int: types.int64, bool: types.boolean}
+    match argument:
+        case Record(cls, fields):
+            return types.NamedTuple(tuple(map(_type_of, fields)), cls)
+        case Wanted():
+            return types.Array(numbers[argument.item], len(argument.shape), "C")
+        case type():
+            return numbers[argument]
+        case tuple():
+            return types.Array(types.float64, len(argument), "C")
+    return types.Array(types.float64, 1 if argument == MODEL else argument, "C", readonly=argument == MODEL)
 
 
 def _argument(argument: Any) -> Any:
-    """An argument of `direct` as a type of numba."""
-    if isinstance(argument, int) or argument == MODEL:
-        return Borrowed((None,) * (1 if argument == MODEL else argument), readonly=argument == MODEL)
-    return Borrowed(argument) if isinstance(argument, tuple) else _type_of(argument)
+    """The type with which an argument of `direct` is passed: arrays are borrowed."""
+    match argument:
+        case Record() | Wanted() | type():
+            return _type_of(argument)
+        case tuple():
+            return Borrowed(argument)
+    return Borrowed((None,) * (1 if argument == MODEL else argument), readonly=argument == MODEL)
 
 
 def _settled(kind: Any) -> Any:

@@ -21,12 +21,20 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from numba import types
-from numba.extending import intrinsic
-
+from kin.kernels.ahead import CHOSEN, NUMBA
 from kin.kernels.compile import PLAIN, inlined
 
-_build: Callable[[Any], Any] = intrinsic  # decorator for functions that emit LLVM instructions
+if CHOSEN == NUMBA:
+    from numba import types
+    from numba.extending import intrinsic
+
+
+def _unchanged(function: Any) -> Any:
+    return function
+
+
+# Decorator for functions that emit LLVM instructions.
+_build: Callable[[Any], Any] = intrinsic if CHOSEN == NUMBA else _unchanged
 
 WIDE = 1e5  # rad; up to here the error of subtracting k·π/2 is negligible
 
@@ -181,7 +189,7 @@ def wrapped(angle: float) -> float:
     return up if angle <= -math.pi else angle
 
 
-if PLAIN:
+if PLAIN or CHOSEN != NUMBA:
     # LLVM intrinsics cannot be called from Python: use the library functions.
 
     def sin_cos(x: float) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from kin.ik import IKOptions, solve_ik
 from kin.ik.batch import solve_ik_many
 from kin.ik.candidates import unchecked
 from kin.ik.table import Table
-from kin.kernels.cache import is_cached
+from kin.kernels.compile import is_cached
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import path_postures, solve_path
 from kin.robot import Robot
