@@ -141,20 +141,24 @@ def _file() -> Path:
         raise ImportError(
             "this installation has no compiled kernels for the processor: set KINBOARD_KERNELS=numba"
         )
-    return _built(next(levels()))
+    return built(_CORE, next(levels()))
 
 
-def _built(level: str) -> Path:
-    """The extension of this checkout, built if a file has changed since the last time."""
+def built(core: Path, level: str) -> Path:
+    """The extension of a checkout, built again if a file of its core has changed since the last time.
+
+    Raises:
+        ImportError: it cannot be built; what the compiler says is on the standard error.
+    """
     folder = user_folder() / "extension"
-    index = folder / f"{hashlib.blake2b(str(_CORE).encode(), digest_size=8).hexdigest()}-{level}.txt"
-    state = _state()
+    index = folder / f"{_hash(str(core))}-{level}.txt"
+    state = _state(core)
     if index.exists():
         known, _, name = index.read_text("utf-8").partition("\n")
         if known == state and (file := folder / name).exists():
             return file
     command = [sys.executable, "-m", BUILDER, str(folder), "--level", level]
-    environment = os.environ | {"KINBOARD_KERNELS": PYTHON, "PYTHONPATH": str(_CORE.parent)}
+    environment = os.environ | {"KINBOARD_KERNELS": PYTHON, "PYTHONPATH": str(core.parent)}
     ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=False)
     if ran.returncode:
         raise ImportError("kernels cannot be compiled (see above): set KINBOARD_KERNELS=numba, or python")
@@ -165,13 +169,17 @@ def _built(level: str) -> Path:
     return file
 
 
-def _state() -> str:
+def _state(core: Path) -> str:
     """Changes when a file of the core does."""
     found = []
-    for place, folders, files in os.walk(_CORE):
+    for place, folders, files in os.walk(core):
         folders[:] = [each for each in folders if each != "__pycache__"]
         found += [(each.path, each.stat().st_mtime_ns) for each in os.scandir(place) if each.name in files]
-    return hashlib.blake2b(repr(sorted(found)).encode(), digest_size=16).hexdigest()
+    return _hash(sorted(found))
+
+
+def _hash(*parts: object) -> str:
+    return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
 
 
 def direct(kernel: Kernel, wanted: list[Wanted | None]) -> Callable[..., Any]:

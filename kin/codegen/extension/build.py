@@ -147,18 +147,22 @@ def module_of(names: Iterable[str]) -> str:
     return module.replace('#include "unit.h"', wrappers.HEADER, 1)
 
 
-def _imports(folder: Path, module: str, level: str) -> list[str]:
-    """For Windows: the library of what the module takes from ``python3.dll``, made from its declarations."""
+def imports_of(module: str) -> list[str]:
+    """What the module takes from ``python3.dll``, as its declarations say: lines of a definition file."""
     declared = " ".join(re.findall(r"^API ([^;]*);", module, re.MULTILINE))
     names = dict(re.findall(r"\b(_?Py\w*_\w+)(\()?", declared))
-    lines = [
+    return [
         f"{name}{'' if call else ' DATA'}"
         for name, call in names.items()
         if name not in ("Py_ssize_t", "Py_buffer")
     ]
+
+
+def _imports(folder: Path, module: str, level: str) -> list[str]:
+    """For Windows: a library of what the module imports, without Python's own."""
     machine = "arm64" if level.startswith("aarch64") else "i386:x86-64"
     file, made = folder / "python3.def", folder / f"python3-{level}.lib"
-    file.write_text("\n".join(["LIBRARY python3.dll", "EXPORTS", *lines, ""]), "utf-8")
+    file.write_text("\n".join(["LIBRARY python3.dll", "EXPORTS", *imports_of(module), ""]), "utf-8")
     _run([sys.executable, "-m", "ziglang", "dlltool", "-m", machine, "-d", str(file), "-l", str(made)])
     return [str(made)]
 

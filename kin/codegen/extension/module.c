@@ -38,6 +38,9 @@ typedef struct PyModuleDef {
   PyModuleDef_Base m_base; const char *m_name, *m_doc; Py_ssize_t m_size; PyMethodDef *m_methods;
   void *m_slots, *m_traverse, *m_clear, *m_free;
 } PyModuleDef;
+#define Py_None (&_Py_NoneStruct)
+#define Py_True (&_Py_TrueStruct)
+#define Py_False (&_Py_FalseStruct)
 #define PyModuleDef_HEAD_INIT {{1, NULL}, NULL, 0, NULL}
 enum { METH_VARARGS = 1, METH_NOARGS = 4, METH_FASTCALL = 0x80, Py_TPFLAGS_TUPLE_SUBCLASS = 1 << 26 };
 enum { PyBUF_WRITABLE = 1, PyBUF_FORMAT = 4, PyBUF_C_CONTIGUOUS = 0x38, PYTHON_ABI_VERSION = 3 };
@@ -61,6 +64,8 @@ API char *PyBytes_AsString(PyObject *);
 API PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...), *PyModule_Create2(PyModuleDef *, int);
 API PyObject *PyCMethod_New(PyMethodDef *, PyObject *, PyObject *, PyTypeObject *);
 #endif
+
+_Static_assert(sizeof(Py_buffer) == 80 && offsetof(Py_buffer, shape) == 48 && sizeof(PyModuleDef) == 104, "64 bits");
 
 #include "units.h" // const kinboard_unit *const units[]
 
@@ -179,7 +184,7 @@ static bool take_number(reader *r, PyObject *given) {
       return (to->w == (uint64_t)-1 && PyErr_Occurred() != NULL) ? wrong(r, "an unsigned integer of 64 bits") : true;
     }
     case 'b':
-      if (given == &_Py_TrueStruct || given == &_Py_FalseStruct) to->b = given == &_Py_TrueStruct;
+      if (given == Py_True || given == Py_False) to->b = given == Py_True;
       else if ((PyObject *)given->ob_type == numpy_bool) to->b = PyObject_IsTrue(given) == 1;
       else return wrong(r, "a bool");
       return true;
@@ -255,8 +260,8 @@ static PyObject *give(const char **gives, kinboard_slot **from) {
     case 'b': return PyBool_FromLong(at->b);
     case 'z': return PyComplex_FromDoubles(at->z.re, at->z.im);
   }
-  Py_IncRef(&_Py_NoneStruct);
-  return &_Py_NoneStruct;
+  Py_IncRef(Py_None);
+  return Py_None;
 }
 
 // ---- the functions of the module ----
@@ -343,8 +348,8 @@ static PyObject *set_up(PyObject *self, PyObject *arguments) {
   for (int k = 0; k < 6; k++) Py_IncRef(items[k].dtype = types[k]);
   Py_IncRef(ndarray), Py_IncRef(numpy_bool), Py_IncRef(numpy_empty);
   readable = fields != 0;
-  Py_IncRef(&_Py_NoneStruct);
-  return &_Py_NoneStruct;
+  Py_IncRef(Py_None);
+  return Py_None;
 }
 
 static PyMethodDef methods[] = {

@@ -1,0 +1,76 @@
+"""What is compiled again, what is said where it cannot be, and that declarations are those of Python."""
+
+from __future__ import annotations
+
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import pytest
+import small
+
+from kin.codegen.extension import build, wrappers
+from kin.kernels import ahead
+
+LEVEL = "x86_64_v2"
+pytestmark = pytest.mark.skipif(LEVEL not in ahead.levels(), reason="gcc is told a level of x86-64")
+
+
+def texts(**changed):
+    """Two units of small kernels."""
+    units = {"one": small.ENTRIES[:2], "two": small.ENTRIES[2:4]}
+    return [(name, wrappers.unit(name, entries) + changed.get(name, "")) for name, entries in units.items()]
+
+
+def test_only_a_unit_that_has_changed_is_compiled_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(build, "compiler", lambda: (["gcc"], "12"))
+    said = []
+
+    def built(made):
+        said.clear()
+        file = build.build(made, tmp_path, LEVEL, build.LINUX, said.append)
+        return file, sorted(what.split()[1] for what in said)
+
+    first, compiled = built(texts())
+    assert compiled == ["module", "one", "two"]
+    assert [name for name, *_ in ahead.loaded(first).entries()] == [
+        f"kin.small.{name}" for name in ("numbers", "nothing", "scaled", "last")
+    ]
+    assert built(texts()) == (first, [])
+    second, compiled = built(texts(two="// changed\n"))
+    assert compiled == ["two"]
+    assert second.name == first.name
+    assert second != first
+    assert not list(tmp_path.rglob("*.c")), "nothing but objects is left"
+    with pytest.raises(build.BuildError, match=r"cannot be compiled: gcc.*\n.*error"):
+        built(texts(one="int x = ;\n"))
+
+
+def test_without_a_compiler_it_is_said_what_to_install(monkeypatch):
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(build.shutil, "which", lambda name: None)
+    with pytest.raises(build.BuildError, match="pip install ziglang"):
+        build.compiler()
+
+
+@pytest.mark.parametrize(("level", "system"), [(LEVEL, build.WINDOWS), ("aarch64", build.LINUX)])
+def test_other_machines_need_ziglang(level, system):
+    with pytest.raises(build.BuildError, match="pip install ziglang"):
+        build.options_for(level, system, zig=False)
+    assert f"--target={level.split('_v')[0]}-{system}" in build.options_for(level, system, zig=True)
+
+
+def test_windows_imports_what_is_declared():
+    found = build.imports_of(build.module_of([]))
+    assert {"PyExc_TypeError DATA", "_Py_NoneStruct DATA", "PyTuple_New", "Py_IncRef"} <= set(found)
+    assert not {name for name in found if name.split()[0] in ("Py_ssize_t", "Py_buffer", "PyObject")}
+
+
+def test_declarations_are_those_of_pythons_headers(tmp_path):
+    headers = Path(sysconfig.get_paths()["include"])
+    if not (headers / "Python.h").exists():
+        pytest.skip("there are no headers of Python")
+    (tmp_path / "module.c").write_text(build.module_of(["small"]))
+    define = ["-DPy_LIMITED_API=0x030b0000", "-DKINBOARD_PYTHON_H=<Python.h>", f"-I{headers}"]
+    command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *define, "-c", "module.c"]
+    subprocess.run(command, cwd=tmp_path, check=True)

@@ -1,0 +1,104 @@
+"""Which extension is loaded, when it is built again, and kernels without a compiler."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import kin
+from kin.kernels import ahead
+from kin.kernels.ahead import Wanted
+
+
+@pytest.fixture
+def core(tmp_path, monkeypatch):
+    """The core of a checkout."""
+    monkeypatch.setenv("KINBOARD_CACHE", str(tmp_path / "cache"))
+    found = tmp_path / "kin"
+    (found / "solvers").mkdir(parents=True)
+    (found / "solvers" / "one.py").write_text("x = 1\n")
+    return found
+
+
+def test_it_is_built_again_only_when_a_file_has_changed(core, monkeypatch):
+    asked = []
+
+    def builder(command, **options):
+        assert command[1:3] == ["-m", ahead.BUILDER]
+        asked.append(options["env"]["KINBOARD_KERNELS"])
+        file = Path(command[3]) / str(len(asked)) / "_kernels.so"
+        file.parent.mkdir(parents=True)
+        file.touch()
+        return SimpleNamespace(returncode=0, stdout=f"{file}\n")
+
+    monkeypatch.setattr(ahead.subprocess, "run", builder)
+    first = ahead.built(core, "level")
+    assert ahead.built(core, "level") == first
+    assert asked == ["python"]
+    file = core / "solvers" / "one.py"
+    os.utime(file, ns=(0, file.stat().st_mtime_ns + 1))
+    second = ahead.built(core, "level")
+    assert second != first
+    second.unlink()
+    assert ahead.built(core, "level") != second
+    (core / "new.py").touch()
+    ahead.built(core, "level")
+    assert len(asked) == 4
+
+
+def test_where_it_cannot_be_built_it_is_said_what_to_set(core, monkeypatch):
+    monkeypatch.setattr(ahead.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=1, stdout=""))
+    with pytest.raises(ImportError, match="KINBOARD_KERNELS=numba"):
+        ahead.built(core, "level")
+
+
+@pytest.mark.parametrize(
+    ("machine", "features", "expected"),
+    [
+        ("arm64", (), ["aarch64"]),
+        ("AMD64", (), ["x86_64_v2"]),
+        ("x86_64", ("AVX2", "FMA3"), ["x86_64_v3", "x86_64_v2"]),
+        ("x86_64", ("AVX2", "FMA3", "AVX512_SKX"), ["x86_64_v4", "x86_64_v3", "x86_64_v2"]),
+        ("x86_64", ("AVX2",), ["x86_64_v2"]),
+    ],
+)
+def test_the_best_level_comes_first(monkeypatch, machine, features, expected):
+    monkeypatch.setattr(ahead.platform, "machine", lambda: machine)
+    module = SimpleNamespace(_multiarray_umath=SimpleNamespace(__cpu_features__=dict.fromkeys(features, True)))
+    monkeypatch.setattr(ahead.np, "_core", module)
+    assert list(ahead.levels()) == expected
+
+
+def test_plain_functions_check_arrays_as_compiled_ones_do():
+    total = ahead.checked(lambda a, x: a.sum() * x, [Wanted((2, None)), None])
+    assert total(np.ones((2, 3)), 2.0) == 12.0
+    for wrong in (np.ones((3, 2)), np.ones((2, 3), int), [[1.0], [2.0]], np.ones((2, 4))[:, ::2]):
+        with pytest.raises(TypeError, match=r"array \(2, None\)"):
+            total(wrong, 2.0)
+
+
+PROGRAM = """
+import json, sys
+import kin
+T = kin.fk("ur5", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+print(json.dumps([len(kin.solve_ik("ur5", T).solutions), "numba" in sys.modules, "llvmlite" in sys.modules]))
+"""
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("kernels", "answer"), [("python", [8, False, False]), ("fortran", "one of numba, c, python")]
+)
+def test_numba_is_not_imported_where_nothing_needs_it(kernels, answer):
+    environment = os.environ | {"KINBOARD_KERNELS": kernels, "PYTHONPATH": str(Path(kin.__file__).parents[1])}
+    ran = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=False
+    )
+    assert answer in ran.stderr if isinstance(answer, str) else json.loads(ran.stdout) == answer
