@@ -8,6 +8,7 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable, Hashable
+from concurrent.futures import Future, ThreadPoolExecutor
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,8 @@ PATIENCE = 30.0  # s until something that must happen has happened, on a machine
 LOOK = 0.005  # s between two looks at the channel
 SAME_STEP, LATE = 0.02, 0.2  # s between the two connections of one step; in all, while an arm moves
 WORK = 10.0  # s for which `settle` waits for a worker that has something to do
+QUIET = 0.3  # s without a message: the page rests, as far as somebody outside of the service can tell
+WINDOW = 0.03  # s; viser holds messages back for a sixtieth of a second
 
 # Of services in this process: workers that something was posted to, those that act, and how many messages of each
 # visitor have been handled, by the visitor's port.
@@ -48,6 +51,8 @@ _acting: weakref.WeakSet[Worker] = weakref.WeakSet()
 _handled: dict[int, int] = {}
 _post, _act, _connect = Worker.post, Worker._act_once, VisitorConnection.__init__
 _connect_channel = ChannelConnection.__init__
+_submit = ThreadPoolExecutor.submit
+_pending: set[Future[Any]] = set()  # what threads of this process compute meanwhile
 
 
 def _watched_post(self: Worker, key: Hashable, value: object = None) -> None:
@@ -61,6 +66,13 @@ def _watched_act(self: Worker) -> float | None:
         return _act(self)
     finally:
         _acting.discard(self)
+
+
+def _watched_submit(self: ThreadPoolExecutor, *given: Any, **named: Any) -> Future[Any]:
+    future = _submit(self, *given, **named)
+    _pending.add(future)
+    future.add_done_callback(_pending.discard)
+    return future
 
 
 def _watched_channel(self: ChannelConnection, visitor: WebSocket) -> None:
@@ -92,11 +104,19 @@ def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
 Worker.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]
 VisitorConnection.__init__ = _watched_connect  # type: ignore[method-assign]
 ChannelConnection.__init__ = _watched_channel  # type: ignore[method-assign]
+ThreadPoolExecutor.submit = _watched_submit  # type: ignore[assignment, method-assign]
 
 
 def working() -> bool:
     """Whether a viewer in this process has something to do that was posted: a page is not at rest then."""
     return bool(list(_acting)) or any(not each.join(0.0) and each._inbox.waits for each in list(_workers))
+
+
+def _acts_soon() -> bool:
+    """Whether a viewer in this process, at rest now, acts by itself within `QUIET`, or may hear of a result."""
+    soon = time.monotonic() + QUIET
+    dues = [each._turn.due for each in list(_workers) if not each.join(0.0)]
+    return bool(_pending) or any(due is not None and due < soon for due in dues)
 
 
 # Messages with a mark in viser's connection, as static/channel.js has them.
@@ -532,8 +552,12 @@ class FakeBrowser:
         while time.monotonic() < end and self.read(SAME_STEP):
             pass
 
-    def settle(self, quiet: float = 0.3, timeout: float = PATIENCE) -> None:
-        """Read messages until the service has handled all that was sent, and then none comes for `quiet` s."""
+    def settle(self, quiet: float | None = None, timeout: float = PATIENCE) -> None:
+        """Read messages until the service has handled all that was sent and none is to come.
+
+        A service in this process is known to rest when all it has sent has arrived; of another one, or with
+        `quiet`, that is assumed after so many seconds without a message.
+        """
         now = time.monotonic()
         end, late, answered = now + timeout, now + WORK, now + (ANSWER if self._owed else 0.0)
         self._owed = False
@@ -543,15 +567,23 @@ class FakeBrowser:
             if now > answered:
                 for wire in wires:
                     wire.sent = _handled.get(wire.port, wire.sent)  # some messages are not passed on
-            if self.viser.port in _handled:
+            here = self.viser.port in _handled
+            if here:
                 rests = now > late or (all(wire.is_handled for wire in wires) and not working())
             else:
                 rests = now > answered
-            if self.read(quiet if rests else 0.02):
-                answered = answered if self.viser.port in _handled else 0.0
-            elif rests:
+            known = here and quiet is None and not (any(self._delays) or _acts_soon())
+            if self.read((WINDOW if known else quiet or QUIET) if rests else 0.02):
+                answered = answered if here else 0.0
+            elif rests and not (known and self._hears_more(wires)):
                 return
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
+
+    def _hears_more(self, wires: list[Wire]) -> bool:
+        """Whether something was on its way, or begins: what the service has sent comes before its answers."""
+        for wire in wires:
+            wire.ping()
+        return self.read(0.0) or working()
 
     def stored(self) -> str:
         """The state that the service has stored in the page, a moment after the last change."""

@@ -49,14 +49,14 @@ def wrong_answers(question: Question) -> Iterator[tuple[list[object], object]]:
 def test_a_lesson_is_answered_from_end_to_end(server: int, lesson: Any, robot_id: str) -> None:
     robot = STORE.get(robot_id)
     with FakeBrowser(server) as tab:
-        tab.settle(0.1)
+        tab.settle()
         tab.choose(robot.name)
         tab.set("Lesson", lesson.title)
         tab.wait(lambda: 'data-guide="steps"' in tab.html)
 
         def press(*key: object, value: object = None) -> None:
             tab.say("feature", ["guide", [*key, len(tab.log)], value])
-            tab.settle(0.05)
+            tab.settle()
             assert BROKEN not in tab.html, f"{lesson.key}, {key}: {value}"
 
         outline = lesson.outline(robot, Units())

@@ -152,8 +152,7 @@ def test_a_page_of_a_link_waits_for_its_arm_and_says_so(port, preparation):
             "its lesson needs more"
         )
         compile_parts(preparation, needed[2:])
-        tab.settle()
-        assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
+        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(UR5, q)))
         assert tab.value("Lesson") == "Redundancy"
         assert preparing(tab) == ""
 
