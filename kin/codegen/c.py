@@ -33,7 +33,6 @@ from kin.codegen.tree import (
     Reshaped,
     Table,
     View,
-    walk,
 )  # fmt: skip
 from kin.codegen.types import (
     BOOL,
@@ -139,7 +138,7 @@ class C(Emitter):
                 zero = _ZEROS.get(kind, "KINBOARD_ZERO")
                 lines.append(f"  {name_of(kind)} {self.name(name)} = {zero};")
         self.kinds += [*it.variables.values(), *it.kinds, it.result]
-        self.kinds += [node.kind for node in walk(it.body) if isinstance(node, Expr)]
+        self.kinds += [node.kind for node in it.nodes if isinstance(node, Expr)]
         start = "KINBOARD_INLINE" if is_inlined(it.function) else "static"
         head = f"{start} {name_of(it.result)} {it.name}({', '.join(names) or 'void'}) {{"
         return "\n".join([*([f"// {it.note}"] if it.note else []), head, *self.storage, *lines, *self.lines, "}"])
@@ -313,7 +312,7 @@ def room_of(made: Instance) -> Scalar | None:
     """Of what the arrays are that a kernel makes and returns; None if it returns none."""
     if not holds_arrays(made.result):
         return None
-    for each in walk(made.body):
+    for each in made.nodes:
         if isinstance(each, New | Copy) and isinstance(each.kind, ArrayOf):
             return each.kind.item
         if isinstance(each, Call) and (kind := room_of(each.callee)) is not None:

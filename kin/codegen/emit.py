@@ -298,10 +298,11 @@ class Emitter:
 def _read(made: Instance) -> set[str]:
     """The variables that something depends on."""
     read: set[str] = set()
+    statements = [node for node in made.nodes if isinstance(node, Statement)]
     while True:
         before = len(read)
-        for node in walk(made.body):
-            if isinstance(node, Statement) and not (isinstance(node, Assign) and _is_idle(node, read)):
+        for node in statements:
+            if not (isinstance(node, Assign) and _is_idle(node, read)):
                 inner = [part for part in vars(node).values() if isinstance(part, Expr)]
                 read |= {e.name for each in inner for e in walk(each) if isinstance(e, Variable)}
         if len(read) == before:
@@ -314,11 +315,11 @@ def _is_idle(node: Assign, read: set[str]) -> bool:
 
 def _own_counters(made: Instance) -> set[str]:
     """The variables that only count in loops: nothing else assigns or reads them."""
-    loops = [node for node in walk(made.body) if isinstance(node, For)]
-    assigned = {node.name for node in walk(made.body) if isinstance(node, Assign)} | set(made.parameters)
+    loops = [node for node in made.nodes if isinstance(node, For)]
+    assigned = {node.name for node in made.nodes if isinstance(node, Assign)} | set(made.parameters)
     found = {loop.name for loop in loops} - assigned
     for name in sorted(found):
-        everywhere = [n for n in walk(made.body) if isinstance(n, Variable) and n.name == name]
+        everywhere = [n for n in made.nodes if isinstance(n, Variable) and n.name == name]
         inside = [n for loop in loops if loop.name == name for n in walk(loop.body) if isinstance(n, Variable)]
         nested = any(
             isinstance(n, For) and n.name == name for loop in loops if loop.name == name for n in walk(loop.body)

@@ -29,7 +29,6 @@ from kin.codegen.tree import (
     Reshaped,
     Table,
     View,
-    walk,
 )  # fmt: skip
 from kin.codegen.types import (
     BOOL,
@@ -73,7 +72,7 @@ class JavaScript(Emitter):
     def function(self) -> str:
         """The definition."""
         it = self.made
-        for each in walk(it.body):
+        for each in it.nodes:
             if isinstance(each, Expr) and (
                 getattr(each.kind, "item", each.kind) in (WORD, SINGLE)
                 or (isinstance(each, Primitive) and each.name in _OF_C)
@@ -98,9 +97,7 @@ class JavaScript(Emitter):
     def releases(self) -> bool:
         """Whether it gives back what it and its callees took of the heap."""
         made = (New, Copy)
-        takes = any(
-            isinstance(e, made) or (isinstance(e, Call) and holds_arrays(e.kind)) for e in walk(self.made.body)
-        )
+        takes = any(isinstance(e, made) or (isinstance(e, Call) and holds_arrays(e.kind)) for e in self.made.nodes)
         return takes and not holds_arrays(self.made.result)
 
     def declared(self, kind: Type, name: str, value: str) -> str:

@@ -32,7 +32,6 @@ from kin.codegen.tree import (
     Return,
     Variable,
     View,
-    walk,
 )  # fmt: skip
 from kin.codegen.types import INT, ArrayOf, TupleOf, Type, holds_arrays
 
@@ -67,8 +66,8 @@ class Rooms:
 
         With a heap, how many arrays.
         """
-        sites = [e for e in walk(made.body) if isinstance(e, New | Copy)]
-        calls = [e for e in walk(made.body) if isinstance(e, Call) and holds_arrays(e.kind)]
+        sites = [e for e in made.nodes if isinstance(e, New | Copy)]
+        calls = [e for e in made.nodes if isinstance(e, Call) and holds_arrays(e.kind)]
         own = len(sites) if self.heap else sum(self.sizes[id(e)] for e in sites)
         return own + sum(self.of_result(e.callee) for e in calls)
 
@@ -85,7 +84,7 @@ class _Following:
     def run(self) -> Bound:
         for settling in range(_PASSES):
             before = dict(self.bounds)
-            for node in walk(self.made.body):
+            for node in self.made.nodes:
                 if isinstance(node, Assign):
                     self._note(node.name, self.of(node.value))
                 elif isinstance(node, For):
@@ -95,7 +94,7 @@ class _Following:
             if settling > 2:  # what still grows has no bound
                 self.bounds |= {k: unknown(self.made.variables[k]) for k in before if before[k] != self.bounds[k]}
         result = None
-        for node in walk(self.made.body):
+        for node in self.made.nodes:
             if isinstance(node, New | Copy):
                 self._measure(node)
             elif isinstance(node, Call):

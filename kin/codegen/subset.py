@@ -88,7 +88,7 @@ def check(made: Instance) -> None:
     """Note which parameters a kernel writes to, and refuse what depends on an order or on a round of a loop."""
     roots = _roots(made)
     written: set[tuple[Any, ...]] = set()
-    for node in walk(made.body):
+    for node in made.nodes:
         if isinstance(node, Store | Fill):
             written |= _origins(node.place, roots)
         elif isinstance(node, Call):
@@ -97,7 +97,7 @@ def check(made: Instance) -> None:
                 written |= _flat(reduce(lambda memory, k: memory[k], items, _memory(arguments[name], roots)))
     made.written = frozenset(path for path in written if path[0] in made.parameters)
     _check_whole(made, roots)
-    for each in walk(made.body):
+    for each in made.nodes:
         if isinstance(each, Statement):
             _check_order(made, each)
         if isinstance(each, For | While):
@@ -108,7 +108,7 @@ def _roots(made: Instance) -> dict[str, Memory]:
     """The memory that each variable may show."""
     roots = {name: _named(kind, (name,)) for name, kind in made.variables.items()}
     for _ in range(3):  # views of views
-        for node in walk(made.body):
+        for node in made.nodes:
             if isinstance(node, Assign) and holds_arrays(made.variables[node.name]):
                 roots[node.name] = _either(roots[node.name], _memory(node.value, roots))
     return roots
@@ -160,10 +160,10 @@ def _check_whole(made: Instance, roots: dict[str, Memory]) -> None:
 
     Python computes all of ``a, b = x + y, x − y`` before it stores anything.
     """
-    fills = [node for node in walk(made.body) if isinstance(node, Fill) and isinstance(node.value.kind, ArrayOf)]
+    fills = [node for node in made.nodes if isinstance(node, Fill) and isinstance(node.value.kind, ArrayOf)]
     made.apart = bool(fills)
     stored = {id(each) for node in fills for each in _summands(node.value)}
-    for node in walk(made.body):
+    for node in made.nodes:
         if isinstance(node, Operation) and isinstance(node.kind, ArrayOf) and id(node) not in stored:
             what = "arithmetic of arrays that is not stored"
             raise OutsideSubsetError(made.function, made.function, what, "write a loop over the entries")
@@ -172,7 +172,7 @@ def _check_whole(made: Instance, roots: dict[str, Memory]) -> None:
             if a.node is b.node and _origins(a.place, roots) & _origins(b.value, roots):
                 what = "arithmetic of arrays stored in one of them"
                 raise OutsideSubsetError(made.function, a.node, what, "write a loop over the entries")
-    for node in walk(made.body):
+    for node in made.nodes:
         if isinstance(node, Call) and node.callee.apart:
             made.apart = True
             origins = [_origins(each, roots) for each in node.arguments]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from functools import cached_property
 from types import FunctionType
 from typing import Any
 
@@ -257,21 +258,27 @@ class Instance:
     written: frozenset[tuple[Any, ...]] = frozenset()
     apart: bool = False
 
+    @cached_property
+    def nodes(self) -> list[Any]:
+        """All expressions and statements of the body, which is complete, in its order."""
+        return list(walk(self.body))
+
 
 def parts(node: Any) -> Iterator[Any]:
     """What an expression or a statement is made of, not what is inside of that."""
-    for each in fields(node):
-        value = getattr(node, each.name)
+    for name in node.__dataclass_fields__:  # those of `fields`, which takes long
+        value = getattr(node, name)
         yield from value if isinstance(value, tuple) else (value,)
 
 
 def walk(node: Any) -> Iterator[Any]:
-    """All expressions and statements in one, itself first."""
-    if isinstance(node, tuple):
-        for each in node:
-            yield from walk(each)
-    elif isinstance(node, Expr | Statement):
-        yield node
-        for part in parts(node):
-            if isinstance(part, Expr | Statement):
-                yield from walk(part)
+    """All expressions and statements in one, or in several, each before what is in it."""
+    waiting = list(reversed(node)) if isinstance(node, tuple) else [node]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, _NODES):
+            yield each
+            waiting.extend(reversed([part for part in parts(each) if isinstance(part, _NODES)]))
+
+
+_NODES = (Expr, Statement)
