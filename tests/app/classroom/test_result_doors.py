@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -62,15 +63,17 @@ def test_a_check_makes_no_database(folder: Path) -> None:
 
 def test_rest_checks_a_code(hub: Hub, folder: Path) -> None:
     code = write_code(ADA, result_key(hub))
-    client = TestClient(create_app(Settings(data=folder)))
-    found = client.get(f"/api/v1/results/{code}").json()
-    assert found["status"] == "signed"
-    assert found["outcome"]["fingerprint"] == "01020304"
-    assert found["outcome"]["solved"] == 9
-    found = client.get(f"/api/v1/results/{write_code(ADA, b'another')}").json()
-    assert (found["status"], found["outcome"]) == ("forged", None)
-    assert client.get("/api/v1/results/UUU").json()["status"] == "mistyped"
-    assert client.get(f"/api/v1/results/{'A' * 500}").status_code == 422
+    application = create_app(Settings(data=folder))
+    with contextlib.closing(application.state.classroom):
+        client = TestClient(application)
+        found = client.get(f"/api/v1/results/{code}").json()
+        assert found["status"] == "signed"
+        assert found["outcome"]["fingerprint"] == "01020304"
+        assert found["outcome"]["solved"] == 9
+        found = client.get(f"/api/v1/results/{write_code(ADA, b'another')}").json()
+        assert (found["status"], found["outcome"]) == ("forged", None)
+        assert client.get("/api/v1/results/UUU").json()["status"] == "mistyped"
+        assert client.get(f"/api/v1/results/{'A' * 500}").status_code == 422
     folder.joinpath("classroom.db").unlink()
     folder.joinpath("classroom.db").mkdir()
     assert TestClient(create_app(Settings(data=folder))).get(f"/api/v1/results/{code}").status_code == 503
