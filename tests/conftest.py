@@ -64,8 +64,15 @@ assert not (moved := [str(file) for file in LONG if not file.exists()]), moved
 # Without --all, a test of each built-in arm runs for these: in tests/kin for one of each family of closed forms,
 # elsewhere, where a closed form is a black box, for some with five to seven joints and one with a slide.
 ONE_OF_EACH_FAMILY = frozenset(robot.id for robot in one_of_each_family())
-# Of tests that generate code, or a page with code, for each arm, those of other arms are slow ones.
-GENERATING = ("test_exact.py", "test_generated_files.py", "test_takehome.py", "test_takehome_solver.py")
+# Of tests that generate code, or a page with code, for each arm, or leave its singularities, those that are no
+# example of a solver are slow ones.
+COSTLY = (
+    "test_leaving.py",
+    "test_exact.py",
+    "test_generated_files.py",
+    "test_takehome.py",
+    "test_takehome_solver.py",
+)
 SOME = frozenset({"pioneer5", "redundant7-craig", "puma560", "scara"})
 
 
@@ -103,7 +110,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         arms = arms_of(item)
         if not arms <= (ONE_OF_EACH_FAMILY if item.path.is_relative_to(TESTS / "kin") else SOME):
             item.add_marker(pytest.mark.full)
-        if item.path.name in GENERATING and not arms <= set(ONE_OF_EACH_SOLVER):
+        if item.path.name in COSTLY and not arms <= set(ONE_OF_EACH_SOLVER):
             item.add_marker(pytest.mark.slow)
     files = list(dict.fromkeys(item.path for item in items))
     computing = {path for path in files if path.is_relative_to(TESTS / "kin")}
@@ -127,6 +134,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--snapshot-update", action="store_true", help="rewrite tests/data/snapshots with today's answers"
     )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def young_heap() -> Iterator[None]:
+    """What a file has left is not looked through again for garbage: a look would soon take seconds."""
+    yield
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
