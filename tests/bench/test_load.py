@@ -160,9 +160,9 @@ def test_visitors_leave_nothing_behind(service):
 
 
 def test_a_steady_load_is_weighed_each_minute(service):
-    rows, early, end = asyncio.run(soak.steady(service, 2, minute=10.0))
+    rows, early, end = asyncio.run(soak.steady(service, 2, minute=4.0))
     assert [row["minute"] for row in rows] == [1, 2]
-    assert all(0 < row["requests"] <= 12 and row["drags"] > 0 for row in rows)  # fewer than ten on a busy machine
+    assert all(0 < row["requests"] <= 6 and row["drags"] > 0 for row in rows)  # fewer than four on a busy machine
     assert not any(row["lost"] for row in rows)
     assert end.seconds > early.seconds > 0.0
 
