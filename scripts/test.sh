@@ -116,14 +116,16 @@ files_of() {
   grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
 }
 # Pages draw for as long as they wait: beside other work, browsers take twice as much of the processors. They come first,
-# then what computes, in four processes, as many tests wait for arms that move; then alone what measures time.
+# then the others, in six processes, as most tests of the page wait for arms that move: with four, two processors were
+# idle for a third of the time. Then alone what measures time.
+# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Six that
+# begin together would each do so.
+start collected nice pytest --collect-only -qq
 failed=
 in_processes="--dist loadfile --no-loadscope-reorder"
 pytest -n 3 $in_processes -m "$selected and browser" $(files_of browser) || failed="$failed browsers"
-# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Four that
-# begin together would each do so. What cannot be collected is said by the run.
-pytest --collect-only -qq >/dev/null 2>&1 || :
-pytest -n 4 $in_processes -m "$selected and not browser and not bench" || failed="$failed tests"
+finish collected >/dev/null || : # what cannot be collected is said by the run
+pytest -n 6 $in_processes -m "$selected and not browser and not bench" || failed="$failed tests"
 finish mypy || failed="$failed mypy"
 [ "$selected" = "not slow and not full" ] || pytest -m "$selected and bench" $(files_of bench) || failed="$failed measurements"
 [ -z "$failed" ] || fail "failed:$failed. The messages are above."
