@@ -89,9 +89,14 @@ def _result(kind: Type, values: Iterator[Any]) -> Any:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two results, or two lists of arguments, have the same bits."""
+    """Whether two results, or two lists of arguments, have the same types and bits; all NaN are one."""
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(same, a, b))
-    if isinstance(a, np.ndarray):
-        return a.shape == b.shape and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-    return bool(a is b is None or a == b or (a != a and b != b))
+    if a is None or type(a) is not type(b):
+        return a is b
+    a, b = np.asarray(a), np.asarray(b)
+    return (a.shape, a.dtype, _bits(a)) == (b.shape, b.dtype, _bits(b))
+
+
+def _bits(array: np.ndarray[Any, Any]) -> bytes:
+    return (np.where(np.isnan(array), np.nan, array) if array.dtype.kind == "f" else array).tobytes()

@@ -76,6 +76,12 @@ def test_every_kernel_that_python_names_is_an_entry():
     assert missing == set()
 
 
+def test_every_entry_has_a_type_for_each_argument():
+    found = map(entry_of, LINES)
+    wrong = [each for each in found if len(each.kinds) != plain(each.kernel).__code__.co_argcount]
+    assert wrong == []
+
+
 @pytest.mark.full
 def test_every_kernel_is_reached_from_an_entry():
     program = Program()

@@ -1,4 +1,4 @@
-"""Generated C beside numba: the same bits, and the same types."""
+"""Generated C beside numba: the same bits."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 from arms import ONE_OF_EACH_SOLVER
 from emitted import ROBOTS, STRICT, answer, exact, targets
-from numba import types
 
 from kin import builtin_robots, fk, solve_ik
 from kin.codegen import files
 from kin.codegen.arm import arm_of
 from kin.codegen.families import alone, without_limits
-from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, ArrayOf, Kernel, TupleOf
 from kin.kernels.compile import PLAIN
 from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE
@@ -137,61 +135,6 @@ int main(void) {{
     done = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True)
     assert int(done.stdout) > 0
     assert done.stderr == ""
-
-
-def kind_of(numba_type):
-    """A type of numba as one of the translator's."""
-    match numba_type:
-        case types.Boolean():
-            return BOOL
-        case types.Integer():
-            return INT
-        case types.Float():
-            return FLOAT
-        case types.Complex():
-            return COMPLEX
-        case types.NoneType():
-            return NONE
-        case types.Array():
-            return ArrayOf(kind_of(numba_type.dtype), numba_type.ndim)
-    return TupleOf(tuple(map(kind_of, numba_type.types)))
-
-
-def signature_of(kinds):
-    """Types of the translator as those of numba."""
-    plain = {BOOL: types.boolean, INT: types.int64, FLOAT: types.float64, COMPLEX: types.complex128}
-
-    def one(kind):
-        if isinstance(kind, ArrayOf):
-            return types.Array(plain[kind.item], kind.ndim, "C")
-        if isinstance(kind, TupleOf):
-            return types.Tuple(tuple(map(one, kind.items)))
-        return plain[kind]
-
-    return tuple(map(one, kinds))
-
-
-def unnamed(kind):
-    return TupleOf(tuple(map(unnamed, kind.items))) if isinstance(kind, TupleOf) else kind
-
-
-@pytest.mark.full
-@pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
-@pytest.mark.parametrize("robot_id", ALL)
-def test_results_have_the_types_that_numba_infers(robot_id):
-    arm = arm_of(ROBOTS[robot_id])
-    compared = 0
-    for made in arm.program.instances:
-        kernel = getattr(__import__(made.function.__module__, fromlist=["_"]), made.function.__name__)
-        kinds = [*made.kinds, *(k for kind in made.kinds if isinstance(kind, TupleOf) for k in kind.items)]
-        named = any(isinstance(kind, TupleOf) and kind.names for kind in kinds)
-        if not hasattr(kernel, "overloads") or named or any(isinstance(kind, Kernel) for kind in made.kinds):
-            continue
-        signature = signature_of(made.kinds)
-        kernel.compile(signature)
-        assert kind_of(kernel.overloads[signature].signature.return_type) == unnamed(made.result), made.name
-        compared += 1
-    assert compared > 20
 
 
 def test_a_family_without_limits_has_nothing_that_they_would_decide():
