@@ -403,7 +403,7 @@ class _Builder(Calls):
                 return Literal(FLOAT, value)
             case complex():
                 return Literal(COMPLEX, value)
-            case np.uint64():
+            case _ if isinstance(value, np.uint64):
                 return Literal(WORD, int(value))
             case tuple():
                 items = tuple(self.known(node, item) for item in value)
