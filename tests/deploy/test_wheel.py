@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import sysconfig
+import types
 import venv
 import zipfile
 from collections.abc import Iterator
@@ -222,3 +223,57 @@ def serving(environment: Path, project: Path) -> Iterator[str]:
             yield found[0]
         finally:
             process.kill()
+
+
+@pytest.fixture
+def hook(tmp_path, monkeypatch):
+    """The build hook, without hatchling, which only calls it, and with files in place of extensions."""
+    interface = types.ModuleType("hatchling.builders.hooks.plugin.interface")
+    interface.BuildHookInterface = object
+    monkeypatch.setitem(sys.modules, interface.__name__, interface)
+    monkeypatch.delenv("KINBOARD_KERNELS", raising=False)
+    monkeypatch.delenv("KINBOARD_TARGET", raising=False)
+    import build_hook
+
+    def built(command, **options):
+        given = dict(zip(command[4::2], command[5::2], strict=True))
+        name = f"_kernels_{given.get('--level', 'own')}.{given.get('--system', 'own')}"
+        return types.SimpleNamespace(stdout=f"{tmp_path / name}\n")
+
+    monkeypatch.setattr(build_hook.subprocess, "run", built)
+    monkeypatch.setattr(build_hook, "write_renamed", lambda source, target: None)
+    made = build_hook.WheelHook()
+    made.root = str(ROOT)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("target", "files", "platform"),
+    [
+        ("", ["_kernels_own.own"], re.sub(r"\W", "_", sysconfig.get_platform())),
+        (
+            "linux-gnu.2.17 x86_64_v2 x86_64_v3",
+            ["_kernels_x86_64_v2.linux-gnu.2.17", "_kernels_x86_64_v3.linux-gnu.2.17"],
+            "manylinux_2_17_x86_64",
+        ),
+        ("macos.11.0 aarch64", ["_kernels_aarch64.macos.11.0"], "macosx_11_0_arm64"),
+    ],
+)
+def test_kernels_are_compiled_for_what_is_named(hook, monkeypatch, target, files, platform):
+    monkeypatch.setenv("KINBOARD_KERNELS", "c")
+    monkeypatch.setenv("KINBOARD_TARGET", target)
+    assert any(each.startswith("ziglang") for each in hook.dependencies())
+    data = {"force_include": {}}
+    hook.initialize("standard", data)
+    hook.finalize("standard", data, "")
+    assert [Path(place).name for place in data["force_include"].values() if place.startswith("kin/")] == files
+    assert (data["tag"], data["pure_python"]) == (f"cp311-abi3-{platform}", False)
+
+
+def test_a_wheel_has_no_kernels_unless_they_are_asked_for(hook):
+    data = {"force_include": {}}
+    hook.initialize("standard", data)
+    hook.finalize("standard", data, "")
+    assert hook.dependencies() == []
+    assert "tag" not in data
+    assert not any(place.startswith("kin/") for place in data["force_include"].values())
