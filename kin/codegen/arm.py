@@ -58,6 +58,10 @@ class Arm:
         """How many configurations a pose has at most."""
         return len(self.form.branches)
 
+    def buffer(self, *entries: str) -> int:
+        """How many doubles of the caller's buffer these entries take, all if none is named."""
+        return max(self.rooms.buffer.get(self.entries[each], 0) for each in entries or self.entries)
+
 
 def arm_of(robot: Robot, closest: bool = True) -> Arm:
     """The program of an arm.
@@ -87,6 +91,7 @@ def arm_of(robot: Robot, closest: bool = True) -> Arm:
         for name, (kernel, kinds, shapes) in _entries(robot, form, found, parameter, constants, closest).items():
             made[name] = program.add(kernel, *kinds)
             rooms.enter(made[name], shapes)
+        rooms.share_buffer(program)
     except OutsideSubsetError as error:
         raise needs_python(robot, form) from error
     return Arm(robot, form, found, parameter, constants, program, rooms, made)
@@ -100,7 +105,7 @@ def _entries(
     n, k = robot.n, len(form.branches)
     kernels = Kernel(plain(found.rows)), Kernel(plain(found.inner))
     q, T, limits = (n,), (4, 4), ((n,), (n,), (n,), (n,))
-    model, params, arcs = constants["model"].shape, found.params.shape, (entries.ROWS_OF_ARCS, 3)
+    model, params, most = constants["model"].shape, found.params.shape, found.intervals
     joint = [INT] if found.stepped else []
     rows, one = (((m, n), (m, 5), (m,), (m,), (m,)) for m in (k, 1))
     made: dict[str, tuple[Any, tuple[Any, ...], tuple[Any, ...]]] = {
@@ -108,8 +113,8 @@ def _entries(
         "jacobian": (jacobian_one, (_V, _V, _M), (model, q, (6, n))),
         "solve": (
             entries.by_steps if found.stepped else entries.solve,
-            (*kernels, _V, _V, _M, _V, _LIMITS, FLOAT, *joint, _M, _ROWS),
-            (None, None, model, params, T, q, limits, None, *[None for _ in joint], arcs, rows),
+            (*kernels, _V, _V, _M, _V, _LIMITS, FLOAT, *joint, INT, _ROWS),
+            (None, None, model, params, T, q, limits, None, *[None for _ in joint], most, rows),
         ),
     }
     if parameter is not None and not found.stepped:
@@ -121,7 +126,7 @@ def _entries(
     if closest:
         made["nearest"] = (
             entries.nearest,
-            (*kernels, _V, _V, _M, _V, _M, _M, _LIMITS, BOOL, _ROWS),
-            (None, None, model, params, T, q, (k, n), constants["starts"].shape, limits, None, one),
+            (*kernels, _V, _V, _M, _V, _M, _M, _LIMITS, BOOL, INT, _ROWS),
+            (None, None, model, params, T, q, (k, n), constants["starts"].shape, limits, None, most, one),
         )
     return made

@@ -1,8 +1,8 @@
 """C99 that is C++ as well: kernels as static functions that need nothing but the mathematical library.
 
 An array is a pointer and its shape, a tuple is a struct; both are passed by value. Every array that a kernel
-makes has a place of constant size on the stack (:mod:`kin.codegen.rooms`), and one that it returns has its place
-with the caller. So there is no heap, no buffer that could overflow and no static state but constants.
+makes has a place of constant size on the stack or in the user's buffer (:mod:`kin.codegen.rooms`), and one that it
+returns has its place with the caller. So there is no heap and no static state but constants.
 
 A Python extension has a heap, for arrays that are large or whose size does not follow. Each place in the source at
 which one is made has one block, which is taken again in the next round of a loop, and released on return.
@@ -17,7 +17,7 @@ from itertools import groupby
 from pathlib import Path
 
 from kin.codegen.emit import ATOM, MULTIPLY, UNARY, Emitter, Text
-from kin.codegen.rooms import Rooms
+from kin.codegen.rooms import Rooms, doubles, room_of
 from kin.codegen.source import ITEMS, OutsideSubsetError, is_inlined
 from kin.codegen.tree import (
     Call,
@@ -47,7 +47,6 @@ from kin.codegen.types import (
     Scalar,
     TupleOf,
     Type,
-    holds_arrays,
 )  # fmt: skip
 from kin.codegen.typing import Program
 
@@ -118,6 +117,7 @@ class C(Emitter):
         self.releases: list[str] = []
         self.places: dict[int, str] = {}  # of what is made, by the id of the expression
         self.used = 0  # of the room that the caller gives
+        self.taken_of_buffer = 0
 
     def function(self) -> str:
         """The definition."""
@@ -132,6 +132,9 @@ class C(Emitter):
         names = [f"{name_of(kind)} {self.name(name)}" for name, kind in passed]
         if self.returned_kind is not None:
             names.insert(0, f"{'block' if self.rooms.heap else NAMES[self.returned_kind]} *room")
+        if self.rooms.buffer.get(it):
+            names.insert(0, "double *memory")
+        assert self.taken_of_buffer <= self.rooms.own.get(it, 0)
         lines = [f"  (void){self.name(name)};" for name, _ in passed if name not in self.read]
         for name, kind in it.variables.items():
             if name not in it.parameters and name in self.read and name not in self.own:
@@ -206,8 +209,11 @@ class C(Emitter):
         if id(node) in self.places:
             return self.places[id(node)]
         if self.returned_kind is None:
-            place = self.fresh("room")
-            start = f"block {place}[{size}] = {{{{0}}}}" if heap else f"{NAMES[item]} {place}[{size}]"
+            place, kind = self.fresh("room"), NAMES[item]
+            start = f"block {place}[{size}] = {{{{0}}}}" if heap else f"{kind} {place}[{size}]"
+            if self.rooms.in_buffer(item, size):  # its words hold numbers of any type
+                start = f"{kind} *{place} = ({kind} *)(memory + {self.taken_of_buffer})"
+                self.taken_of_buffer += doubles(item, size)
             self.storage.append(f"  {start};")
             self.releases += [f"released({place}, {size});"] if heap else []
         else:
@@ -281,6 +287,8 @@ class C(Emitter):
         if (kind := room_of(value.callee)) is not None:
             size = self.rooms.of_result(value.callee)
             arguments = [self.place(value, size, kind, self.rooms.heap), *arguments]
+        if self.rooms.buffer.get(value.callee):
+            arguments = [f"memory + {self.rooms.own[self.made]}", *arguments]
         return f"{value.callee.name}({', '.join(arguments)})"
 
     def stored(self, place: Entry, value: Expr) -> str:
@@ -306,18 +314,6 @@ class C(Emitter):
             *self.releases,
             f"return {result};",
         ]
-
-
-def room_of(made: Instance) -> Scalar | None:
-    """Of what the arrays are that a kernel makes and returns; None if it returns none."""
-    if not holds_arrays(made.result):
-        return None
-    for each in made.nodes:
-        if isinstance(each, New | Copy) and isinstance(each.kind, ArrayOf):
-            return each.kind.item
-        if isinstance(each, Call) and (kind := room_of(each.callee)) is not None:
-            return kind
-    return None
 
 
 def _definitions(kinds: Iterable[Type]) -> list[str]:
@@ -355,7 +351,8 @@ def unit(program: Program, rooms: Rooms) -> str:
     kinds: list[Type] = [ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2), ArrayOf(INT, 1), TupleOf((FLOAT, FLOAT))]
     names = {each.name for each in program.instances} | set(program.tables)
     C.shapes = {name: value.shape for name, value in program.tables.items()}
-    texts = [C(each, WORDS | names, rooms, kinds).function() for each in program.instances]
+    taken = WORDS | names | {"memory", "room"}
+    texts = [C(each, taken, rooms, kinds).function() for each in program.instances]
     tables = []
     for name, value in program.tables.items():
         numbers = ", ".join(map(repr, value.ravel().tolist()))

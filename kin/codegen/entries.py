@@ -48,7 +48,7 @@ _ALIKE, _SHARE = TOLERANCES.better_minimum, TOLERANCES.better_minimum_share
 
 def solve(
     rows: Inner, inner: Inner, model: Array, params: Array, target: Array, seed: Array, limits: Limits,
-    value: float, arcs: Array, found: Rows,
+    value: float, most: int, found: Rows,
 ) -> tuple[int, int]:  # fmt: skip
     """Configurations of a pose: (what kind of answer, how many of found.order).
 
@@ -56,12 +56,12 @@ def solve(
     those that meet the point and the approach direction, the smallest rotation about it first. LIMITS: those
     outside the limits, the least outside first. UNMET: none. INVALID: the target ``(4, 4)`` is no pose, or the
     seed not finite. value: that of the redundancy parameter, NaN for, of each branch, the one nearest to the
-    seed's that the limits allow.
+    seed's that the limits allow. most: `Alone.intervals`.
     """
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
         return INVALID, 0
-    rows(inner, params, T, value, seed, (limits[0], limits[1]), arcs, found.q)
+    rows(inner, params, T, value, seed, (limits[0], limits[1]), np.empty((most, 3)), found.q)
     pose = _requirement(model, limits, POSE)
     count = measure_and_sort(pose, T, seed, seed, found)
     if count < 0:
@@ -90,7 +90,7 @@ def solve(
 
 def by_steps(
     rows: Inner, inner: Inner, model: Array, params: Array, target: Array, seed: Array, limits: Limits,
-    value: float, joint: int, arcs: Array, found: Rows,
+    value: float, joint: int, most: int, found: Rows,
 ) -> tuple[int, int]:  # fmt: skip
     """As `solve`, of an arm whose redundancy parameter is a joint, for a value that may be NaN.
 
@@ -107,10 +107,10 @@ def by_steps(
         at = start + (k // 2) * (math.pi / HALF_TURN) * (1.0 if k % 2 == 0 else -1.0)
         if low <= at <= high:
             asked = math.nan if own and k == 1 else at
-            status, count = solve(rows, inner, model, params, target, seed, limits, asked, arcs, found)
+            status, count = solve(rows, inner, model, params, target, seed, limits, asked, most, found)
             if steps == 0 or status <= SOLVED:  # or INVALID
                 return status, count
-    return solve(rows, inner, model, params, target, seed, limits, start, arcs, found)
+    return solve(rows, inner, model, params, target, seed, limits, start, most, found)
 
 
 def _requirement(model: Array, limits: Limits, task: int) -> Requirement:
@@ -199,20 +199,20 @@ def intervals(
 
 def nearest(
     rows: Inner, inner: Inner, model: Array, params: Array, target: Array, seed: Array, known: Array,
-    starts: Array, limits: Limits, point: bool, found: Rows,
+    starts: Array, limits: Limits, point: bool, most: int, found: Rows,
 ) -> int:  # fmt: skip
     """found.q[0] ← the configuration inside the limits that comes nearest to a pose, or first to its point.
 
     At 0.1 m per radian, as `kin.solve_ik` does it: descents from the seed, from the branches (known ``(k, n)`` is
     scratch) and from points spread over the limits ``(m, n)``. Where `point` counts first and can be met, what
     meets it with the smallest rotation error. SOLVED if it meets the pose as exactly as those of `solve`,
-    ORIENTATION if it meets the point alone, else UNREACHABLE, or INVALID.
+    ORIENTATION if it meets the point alone, else UNREACHABLE, or INVALID. most: `Alone.intervals`.
     """
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
         return INVALID
     lower, upper, turns, _ = limits
-    rows(inner, params, T, math.nan, seed, (lower, upper), np.empty((ROWS_OF_ARCS, 3)), known)
+    rows(inner, params, T, math.nan, seed, (lower, upper), np.empty((most, 3)), known)
     n, m = seed.shape[0], starts.shape[0]
     size = 1 + known.shape[0] + m
     q, costs = np.empty((size, n)), np.empty(size)

@@ -18,6 +18,7 @@ import numpy as np
 from kin.angles import TURN
 from kin.axes import NEARLY, size
 from kin.codegen import wrappers
+from kin.codegen.entries import ROWS_OF_ARCS
 from kin.codegen.source import plain
 from kin.codegen.types import Constants
 from kin.differential.metric import extent
@@ -85,6 +86,14 @@ class Alone(NamedTuple):
     inner: Inner | Constants
     params: Array
     stepped: bool = False
+
+    @property
+    def intervals(self) -> int:
+        """How many intervals of free joints the adapter writes at most; if none, one row that is not read."""
+        rows, inner = self.rows, self.inner
+        while isinstance(inner, Constants):
+            rows, inner = inner.rows, inner.inner
+        return 1 if rows in (without_limits, of_elimination) else ROWS_OF_ARCS
 
     def within(self, rows: Inner, **constants: Any) -> Alone:
         """The same for another arm, whose branches an adapter of `kin.codegen.wrappers` makes of these."""

@@ -83,10 +83,15 @@ def c_file(arm: Arm, name: str) -> str:
     made = arm.entries
     values = _common(arm, name) | {
         "kernels": c.unit(arm.program, arm.rooms), "constants": _constants(arm, name),
-        "rows_type": c.name_of(made["solve"].kinds[-1]),
+        "rows_type": c.name_of(made["solve"].kinds[-1]), "buffer": arm.buffer(),
         "why_unmet": f"; {name}_nearest says why" if "nearest" in made else "",
         "home": _numbers(arm.robot.q_home),
     }  # fmt: skip
+    for each in made:
+        needed = arm.buffer(each) > 0
+        values[f"{each}_scratch"] = f", {name}_scratch *scratch" if needed else ""
+        values[f"{each}_memory"] = "scratch->numbers, " if needed else ""
+        values[f"{each}_passed"] = ", scratch" if needed else ""
     return _file(arm, name, "c", values)
 
 
@@ -120,7 +125,7 @@ def _common(arm: Arm, name: str) -> dict[str, object]:
     return {
         "name": name, "NAME": name.upper(), "n": n, "k": arm.rows, "size_of_jacobian": 6 * n,
         "joint": f"{arm.parameter.joint}, " if arm.parameter and arm.alone.stepped else "",
-        "step": 180 // entries.HALF_TURN, "arcs": entries.ROWS_OF_ARCS, "intervals": _INTERVALS,
+        "step": 180 // entries.HALF_TURN, "arcs": arm.alone.intervals, "intervals": _INTERVALS,
         "starts": len(arm.constants.get("starts", ())),
         "parameter": "" if arm.parameter is None else _ascii(arm.parameter.label),
         "circular": "true" if arm.parameter is not None and arm.parameter.circular else "false",
@@ -140,6 +145,10 @@ def _file(arm: Arm, name: str, kind: str, values: dict[str, object]) -> str:
 def _sections(arm: Arm) -> set[str]:
     """The parts of the interface that an arm has."""
     found = {"intervals", "nearest"} & set(arm.entries)
+    if arm.buffer():
+        found.add("buffer")
+    if arm.buffer("solve"):
+        found.add("ik_buffer")
     if arm.robot.n < 6:
         found.add("few")
     if arm.parameter is None:
@@ -204,9 +213,12 @@ def _head(arm: Arm, name: str, kind: str) -> Iterable[str]:
     yield from _not_promised(arm)
     yield ""
     if kind == "c":
-        size = sum(arm.rooms.sizes.values()) / 125
-        yield "No heap, no static state: any number of threads may call it. Everything is on the stack, arrays of"
-        yield f"{size:.0f} kB in all. To use it, #include it for the declarations, and compile it once with"
+        if size := arm.buffer():
+            yield "No heap, no static state: any number of threads may call it, each with a buffer of its own for"
+            yield f"large arrays, {name}_scratch of {size / 125:.0f} kB. Small ones are on the stack."
+        else:
+            yield "No heap, no static state: any number of threads may call it. All arrays are on the stack."
+        yield "To use it, #include it for the declarations, and compile it once with"
         yield f"-D{name.upper()}_IMPLEMENTATION, not together with another arm's. To try it:"
         yield f"  cc -std=c99 -O2 -D{name.upper()}_EXAMPLE {name}.c -lm"
     else:

@@ -1,14 +1,18 @@
-"""How large every array of a program is at most, so that C needs no buffer that could overflow.
+"""How large every array of a program is at most, and where it is in C: no buffer can overflow.
 
 The arrays that an entry is called with have known shapes. From them follow the shapes of all views and the numbers
 in all shapes, kernel by kernel: upper bounds, since a slice may show less. An array whose size does not follow is
 refused, or is on the heap.
+
+Small arrays are on the stack. Without a heap, large ones are in a buffer that the caller gives, since the stack of
+a microcontroller or of a thread might be too small: those of a kernel first, those of what it calls behind them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import starmap
 from typing import Any
 
 from kin.codegen.source import OutsideSubsetError
@@ -33,12 +37,27 @@ from kin.codegen.tree import (
     Variable,
     View,
 )  # fmt: skip
-from kin.codegen.types import INT, ArrayOf, TupleOf, Type, holds_arrays
+from kin.codegen.types import (
+    BOOL,
+    COMPLEX,
+    FLOAT,
+    INT,
+    SINGLE,
+    WORD,
+    ArrayOf,
+    Scalar,
+    TupleOf,
+    Type,
+    holds_arrays,
+)  # fmt: skip
+from kin.codegen.typing import Program
 
 # Of a whole number its largest value, of an array and of a tuple those of its axes and items; None: not known.
 Bound = Any
 _PASSES = 6
 UNKNOWN = 1 << 62  # more than any size
+_BYTES = {FLOAT: 8, INT: 8, WORD: 8, COMPLEX: 16, SINGLE: 4, BOOL: 1}
+_LARGE, _SMALL = 64, 512  # doubles: of an array on the stack, and of all arrays that need no buffer, at most
 
 
 class Rooms:
@@ -47,11 +66,17 @@ class Rooms:
     Args:
         known: bounds of variables that do not follow, by the names of kernel and variable.
         heap: whether there is a heap, for arrays whose size does not follow and for those that kernels return.
+
+    Attributes:
+        own: how many doubles of the caller's buffer a kernel's own arrays take; empty without a buffer.
+        buffer: the same with those of all that it calls.
     """
 
     def __init__(self, known: Mapping[tuple[str, str], int], heap: bool = False) -> None:
         self.known, self.heap = known, heap
         self.sizes: dict[int, int] = {}  # by the id of a `New` or `Copy`
+        self.own: dict[Instance, int] = {}
+        self.buffer: dict[Instance, int] = {}
         self._results: dict[tuple[Instance, Bound], Bound] = {}
 
     def enter(self, made: Instance, arguments: Sequence[Bound]) -> Bound:
@@ -70,6 +95,49 @@ class Rooms:
         calls = [e for e in made.nodes if isinstance(e, Call) and holds_arrays(e.kind)]
         own = len(sites) if self.heap else sum(self.sizes[id(e)] for e in sites)
         return own + sum(self.of_result(e.callee) for e in calls)
+
+    def share_buffer(self, program: Program) -> None:
+        """Put large arrays into a buffer, unless they are few; those of two callees are in the same place."""
+        own: dict[Instance, int] = {}
+        buffer: dict[Instance, int] = {}
+        for made in program.instances:  # callees first
+            own[made] = sum(size for size in starmap(doubles, self._places(made)) if size > _LARGE)
+            calls = [e.callee for e in made.nodes if isinstance(e, Call)]
+            buffer[made] = own[made] + max((buffer[callee] for callee in calls), default=0)
+        if max(buffer.values()) > _SMALL:
+            self.own, self.buffer = own, buffer
+
+    def in_buffer(self, item: Scalar, count: int) -> bool:
+        """Whether an array of so many entries is in the caller's buffer."""
+        return bool(self.buffer) and doubles(item, count) > _LARGE
+
+    def _places(self, made: Instance) -> Iterator[tuple[Scalar, int]]:
+        """Types and numbers of entries of the arrays that a kernel keeps."""
+        if room_of(made) is not None:
+            return
+        for node in made.nodes:
+            if isinstance(node, New | Copy):
+                assert isinstance(node.kind, ArrayOf)
+                yield node.kind.item, self.sizes[id(node)]
+            elif isinstance(node, Call) and (item := room_of(node.callee)) is not None:
+                yield item, self.of_result(node.callee)
+
+
+def doubles(item: Scalar, count: int) -> int:
+    """How many doubles an array of so many entries takes."""
+    return math.ceil(_BYTES[item] * count / 8)
+
+
+def room_of(made: Instance) -> Scalar | None:
+    """Of what the arrays are that a kernel makes and returns; None if it returns none."""
+    if not holds_arrays(made.result):
+        return None
+    for each in made.nodes:
+        if isinstance(each, New | Copy) and isinstance(each.kind, ArrayOf):
+            return each.kind.item
+        if isinstance(each, Call) and (kind := room_of(each.callee)) is not None:
+            return kind
+    return None
 
 
 class _Following:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from kin.codegen import c
-from kin.codegen.rooms import Rooms, unknown
+from kin.codegen.rooms import Rooms, room_of, unknown
 from kin.codegen.source import decorators
 from kin.codegen.tree import Instance
 from kin.codegen.types import NONE, ArrayOf, Scalar, TupleOf, Type
@@ -159,7 +159,7 @@ def _prototype(entry: Entry, made: Instance, name: str, rooms: Rooms) -> Prototy
         for value in _values(kind, (parameter,), made.written)
     )
     results = tuple(_values(made.result, (), frozenset()))
-    blocks = 0 if c.room_of(made) is None else rooms.of_result(made)
+    blocks = 0 if room_of(made) is None else rooms.of_result(made)
     parameters = [text for k, value in enumerate(arguments) for text in _parameters(value.kind, f"a{k}", "")]
     parameters += [text for k, value in enumerate(results) for text in _parameters(value.kind, f"r{k}", "*")]
     parameters += ["block *room"] if blocks else []

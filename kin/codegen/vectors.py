@@ -22,13 +22,13 @@ _TEXT = Template("""\
 static const double asked[${count}][${width}] = {${asked}}; // pose, seed, value of the redundancy parameter
 static const int counts[${count}] = {${counts}};
 static const double expected[${total}][${n}] = {${expected}};
-int main(void) {
+${buffer}int main(void) {
   int wrong = 0, at = 0;
   for (int i = 0; i < ${count}; i++) {
     ${name}_solution found[${NAME}_MOST];
     int count = 0;
     const double *T = asked[i], *seed = asked[i] + 16;
-    int status = ${call};
+    int status = ${name}_${call};
     bool right = status == ${NAME}_SOLVED && count == counts[i];
     for (int k = 0; right && k < count; k++)
       for (int j = 0; j < ${n}; j++) right = right && fabs(found[k].q[j] - expected[at + k][j]) < 1e-6;
@@ -69,7 +69,7 @@ def c_test(arm: Arm, name: str) -> str:
         asked=array_of(np.column_stack([T.reshape(COUNT, 16), seeds, values])),
         counts=", ".join(str(len(each)) for each in found),
         expected=array_of(np.array([solution.q for each in found for solution in each])),
-        call=f"{name}_ik_at(T, seed[{robot.n}], seed, found, &count)"
-        if joint >= 0
-        else f"{name}_ik(T, seed, found, &count)",
+        buffer=f"static {name}_scratch buffer, *scratch = &buffer;\n" if arm.buffer("solve") else "",
+        call=("ik(T, " if joint < 0 else f"ik_at(T, seed[{robot.n}], ")
+        + ("seed, found, &count, scratch)" if arm.buffer("solve") else "seed, found, &count)"),
     )

@@ -61,6 +61,7 @@ class Figures(NamedTuple):
     js_text: bytes
     code: int
     stack: int
+    buffer: int
 
     def row(self) -> list[str]:
         """The cells of a table."""
@@ -68,7 +69,7 @@ class Figures(NamedTuple):
         texts = [
             f"{len(x) / 1000:.0f} kB ({len(gzip.compress(x)) / 1000:.0f})" for x in (self.c_text, self.js_text)
         ]
-        sizes = [f"{x / 1000:.0f} kB" for x in (self.code, self.stack)]
+        sizes = [f"{x / 1000:.0f} kB" for x in (self.code, self.stack, self.buffer)]
         return [*times, *texts, *sizes]
 
 
@@ -127,13 +128,16 @@ def in_c(
 ) -> tuple[Callable[[], int], Built]:
     """The C file in this process: all targets, and each function."""
     call = f"{name}_ik_at(T + 16 * i, values[i]," if arm.alone.stepped else f"{name}_ik(T + 16 * i,"
+    buffer = f"static {name}_scratch scratch;" if arm.buffer("solve") else ""
+    last = ", &scratch" if buffer else ""
     (folder / "many.c").write_text(f"""#define {name.upper()}_IMPLEMENTATION
 #include "{name}.c"
+{buffer}
 int many(const double *T, const double *seeds, const double *values, int n) {{
   {name}_solution found[{arm.rows}];
   int count, total = 0;
   (void)values;
-  for (int i = 0; i < n; i++) {{ {call} seeds + {arm.robot.n} * i, found, &count); total += count; }}
+  for (int i = 0; i < n; i++) {{ {call} seeds + {arm.robot.n} * i, found, &count{last}); total += count; }}
   return total;
 }}
 """)
@@ -257,7 +261,8 @@ def measured(robot: kin.Robot, folder: Path, cc: Sequence[str]) -> tuple[Figures
     code, deep = footprint(name, folder, f"{name}_ik" + "_at" * arm.alone.stepped)
     alone = arm.parameter is None or given is not None
     kernels = microseconds(in_kernels(arm, T, seeds, values), len(T))[0] if alone else None
-    figures = Figures(in_c_, in_js, kernels, microseconds(ask, len(T))[0], texts["c"], texts["js"], code, deep)
+    solving, buffer = microseconds(ask, len(T))[0], 8 * arm.buffer("solve")
+    figures = Figures(in_c_, in_js, kernels, solving, texts["c"], texts["js"], code, deep, buffer)
     return figures, [compared(built, asked, given) for asked in ((T, seeds, q), targets(robot, 0, HARD))]
 
 
@@ -276,8 +281,9 @@ def main() -> None:
     options.add_argument("--cc", default="gcc -O2", help="compiler and options of the C that is timed")
     given = options.parse_args()
     chosen = [ROBOTS[each] for each in given.robots] or one_of_each()
-    print("| arm, family | C | JavaScript | kernels | `solve_ik` | text of C | of JavaScript | code | stack |")
-    print(9 * "|---" + "|")
+    cells = "arm, family", "C", "JavaScript", "kernels", "`solve_ik`", "text of C", "of JavaScript", "code"
+    print("|", *(f"{each} |" for each in (*cells, "stack", "buffer")))
+    print(10 * "|---" + "|")
     answers: list[str] = []
     for robot in chosen:
         with tempfile.TemporaryDirectory() as folder:

@@ -69,14 +69,16 @@ class Built:
             )
 
         self.found = (Solution * self.arm.rows)()
+        self.scratch = (ctypes.c_double * self.arm.buffer())()
 
     def call(self, name, *arguments):
-        """The status that a function returns, with NumPy arrays and floats as arguments."""
+        """The status that a function returns, with NumPy arrays and floats as arguments, and its buffer."""
         given = [
             a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) if isinstance(a, np.ndarray)
             else ctypes.c_double(a) if isinstance(a, float) else a
             for a in arguments
         ]  # fmt: skip
+        given += [self.scratch] * (self.arm.buffer({"ik": "solve", "ik_at": "solve"}.get(name, name)) > 0)
         return getattr(self.library, f"{self.name}_{name}")(*given)
 
     def ik(self, T, seed, value=math.nan):
@@ -104,8 +106,8 @@ def compiled(arm: Arm, folder: Path, *options: str) -> Built:
 
 
 def exact(robot: kin.Robot, folder: Path, level: str) -> Built:
-    """A library that fuses as numba does."""
-    return compiled(arm_of(robot, False), folder, level, *EXACT)
+    """A library that fuses as numba does, of functions that take little of the stack."""
+    return compiled(arm_of(robot, False), folder, level, "-Wstack-usage=4096", *EXACT)
 
 
 def targets(robot: kin.Robot, random: int, hard: int):

@@ -118,11 +118,12 @@ def test_c_is_also_strict_cpp_and_clean_under_sanitizers(robot_id, tmp_path):
 static const double data[{len(T)}][{16 + robot.n}] = {{{numbers}}};
 int main(void) {{
   {name}_solution found[{arm.rows}];
+  static {name}_scratch scratch;
   int count, total = 0;
   for (int i = 0; i < {len(T)}; i++) {{
-    {name}_ik(data[i], data[i] + 16, found, &count);
+    {name}_ik(data[i], data[i] + 16, found, &count{", &scratch" * (arm.buffer("solve") > 0)});
     total += count;
-    if (i % 20 == 0) {name}_nearest(data[i], data[i] + 16, i % 40 == 0, found);
+    if (i % 20 == 0) {name}_nearest(data[i], data[i] + 16, i % 40 == 0, found, &scratch);
   }}
   printf("%d\\n", total);
   return 0;

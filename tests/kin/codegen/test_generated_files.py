@@ -241,20 +241,21 @@ console.log(JSON.stringify({{
 
 
 def test_a_heap_that_overflows_is_an_error_of_its_own_and_leaves_the_solver_working(tmp_path):
-    text = kin.generate("planar2r", "js", name="arm").replace(f"Float64Array({js.SIZE})", "Float64Array(1000)")
+    text = kin.generate("pioneer5", "js", name="arm", closest=False)
+    text = text.replace(f"Float64Array({js.SIZE})", "Float64Array(800)")
     (tmp_path / "arm.js").write_text(text)
     run = """
 const arm = require("./arm.js"), said = [];
 for (let k = 0; k < 3; k++) {
-  const T = arm.fk([0.3, 0.8]);
+  const T = arm.fk([0.3, 0.8, 0.1, 0.2, 0.3]);
   said.push(T[0][3].toFixed(9));
-  try { arm.ik(T, [0, 0]); } catch (error) { said.push(error.constructor.name + ": " + error.message); }
+  try { arm.ik(T, [0, 0, 0, 0, 0]); } catch (error) { said.push(error.constructor.name + ": " + error.message); }
 }
 console.log(JSON.stringify(said));
 """
     command = [compute_driver_executable()[0], "-e", run]
     done = json.loads(subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout)
-    assert done[::2] == [f"{kin.fk('planar2r', [0.3, 0.8])[0, 3]:.9f}"] * 3
+    assert done[::2] == [f"{kin.fk('pioneer5', [0.3, 0.8, 0.1, 0.2, 0.3])[0, 3]:.9f}"] * 3
     assert [each.partition(":")[0] for each in done[1::2]] == ["RangeError"] * 3
     assert "more memory" in done[1]
 
@@ -276,6 +277,18 @@ console.log(JSON.stringify({ answers: given.map((T) => arm.ik(T, seed).solutions
     assert done["answers"] == [1] * 4
     assert len(done["refused"]) == 22
     assert all(re.match(r"(q|T|seed): ", each) for each in done["refused"]), done["refused"]
+
+
+def test_large_arrays_are_in_a_buffer_of_the_caller_s_unless_they_are_few():
+    sizes = {"double": 8, "int64_t": 8, "cplx": 16, "bool": 1}
+    for robot_id, bytes_, closest in (("iiwa14", 30_000, False), ("planar2r", 4096, True), ("planar2r", 0, False)):
+        text = kin.generate(robot_id, "c", closest=closest)
+        here = re.findall(r"^  (double|int64_t|cplx|bool) room\d+\[(\d+)\];$", text, re.MULTILINE)
+        assert max(sizes[kind] * int(count) for kind, count in here) <= 512
+        buffer = re.search(r"double numbers\[(\d+)\];\n  int64_t wholes\[(\d+)\];\n}", text)
+        assert (buffer is not None) == (f"{robot_id}_scratch" in text) == (bytes_ > 0)
+        if buffer:
+            assert bytes_ < 8 * int(buffer[1]) == 8 * int(buffer[2]) < 4 * bytes_
 
 
 def test_an_es_module_and_its_types_name_the_same_functions():
