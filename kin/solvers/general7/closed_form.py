@@ -31,7 +31,7 @@ from kin.solvers.general6 import General6
 from kin.solvers.general7.motion import nearest_on_motion, to_images
 from kin.solvers.reduced import fixed
 from kin.solvers.reversed import WrappedKernels
-from kin.solvers.selfmotion.following import Followed
+from kin.solvers.selfmotion.following import Motions
 from kin.solvers.selfmotion.points import JOINT, SETTING
 from kin.solvers.selfmotion.tracing import end_of_motion
 from kin.tolerances import TOLERANCES
@@ -128,53 +128,41 @@ class Fold:
         return WrappedKernels(form.params, one, many, self.kernels, form)
 
 
-class Motions:
-    """The self-motions of a target through some of its solutions, as far as they keep the limits or come close.
-
-    Attributes:
-        joint: whose values say where they are.
-        limits: ``(2, 7)`` of the joints.
-        ranges: ``(m, 2)`` the joint's values on each piece that keeps the limits, at some whole turn. Where the
-            joint turns back, another piece begins.
-        inner: ``(m, 7)`` a configuration inside each.
-        points: ``(M, 7)`` configurations along them, close to each other.
-        lost: whether one of them could not be followed.
-    """
-
-    def __init__(self, robot: Robot, problem: SolverInput, joint: int, q: Array, others: Array = _NONE) -> None:
-        self.joint, setting, self._found = joint, np.zeros(SETTING), Followed()
-        setting[JOINT] = joint
-        self.limits = np.clip((problem.lower, problem.upper), -UNBOUNDED, UNBOUNDED)
-        self._goal = robot.model, problem.T, setting, self.limits, _MARGIN
-        count, lost = self._found.follow(*self._goal, np.concatenate([q, others]))
-        self.ranges, self.inner = self._found.pieces[:count, :2].copy(), self._found.postures[:count, 2].copy()
-        self.points, self.lost = self._found.points, bool(lost[: len(q)].any())
-
-    def counts(self, values: Array) -> NDArray[np.int64]:
-        """How many pieces have each value ``(N,)`` of the joint."""
-        ahead = (values[:, None] - self.ranges[:, 0] + TOLERANCES.limit) % TURN
-        return np.asarray((ahead <= self.ranges[:, 1] - self.ranges[:, 0] + 2.0 * TOLERANCES.limit).sum(axis=1))
-
-    def have(self, q: Array) -> bool:
-        """Whether configurations ``(k, 7)`` inside the limits that meet the target are all on them."""
-        more, lost = self._found.follow(*self._goal, q)
-        return more == 0 and not lost.any()
-
-
 class Sweep(NamedTuple):
     """What all values of a target's redundancy parameter were searched for, and what is there.
 
     Attributes:
         motions: the self-motions.
+        ranges: ``(m, 2)`` values of the sweeper's joint on each piece that keeps the limits, at some whole turn.
+            Where the joint turns back, another piece begins.
+        inner: ``(m, 7)`` a configuration inside each.
         rows, outside: ``(k, 7)`` all solutions at the values at which they were computed, and ``(k,)`` how far
             each is outside the limits; NaN and ∞ where there is none.
         agreed: whether at each of these values as many solutions keep the limits as motions that were followed do.
     """
 
     motions: Motions
+    ranges: Array
+    inner: Array
     rows: Array
     outside: Array
     agreed: bool
+
+    def have(self, q: Array) -> bool:
+        """Whether configurations ``(k, 7)`` inside the limits that meet the target are all on the motions."""
+        more, _, lost = self.motions.follow(q)
+        return not len(more) and not lost.any()
+
+
+def _counts(ranges: Array, values: Array) -> NDArray[np.int64]:
+    """How many ranges ``(m, 2)`` of an angle have each value ``(N,)``."""
+    ahead = (values[:, None] - ranges[:, 0] + TOLERANCES.limit) % TURN
+    return np.asarray((ahead <= ranges[:, 1] - ranges[:, 0] + 2.0 * TOLERANCES.limit).sum(axis=1))
+
+
+def _limits(problem: SolverInput) -> Array:
+    """Lower and upper limits ``(2, 7)``, finite."""
+    return np.clip((problem.lower, problem.upper), -UNBOUNDED, UNBOUNDED)
 
 
 class General7(ClosedForm):
@@ -228,7 +216,7 @@ class General7(ClosedForm):
         out = self._at(p, np.array([value]))[0]
         known = self._add_missing(p, value, out)
         if sweep is not None:
-            agreed = sweep.agreed and sweep.motions.have(out[self._outside(p, out) == 0.0])
+            agreed = sweep.agreed and sweep.have(out[self._outside(p, out) == 0.0])
             known = weakest(known, "agreed" if agreed else "searched")
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
@@ -247,9 +235,17 @@ class General7(ClosedForm):
         values = np.unique(np.append(low + (np.arange(count) + 0.5) * ((high - low) / max(count, 1)), value))
         rows = self._at(p, values)
         outside = self._outside(p, rows)
-        motions, inside = Motions(self.robot, p, i, rows[outside < _MARGIN], known), outside == 0.0
-        agreed = inside.any() and not motions.lost and (motions.counts(values) == inside.sum(axis=1)).all()
-        return Sweep(motions, rows.reshape(-1, 7), outside.ravel(), bool(agreed))
+        motions, starts, inside = self._motions(p), rows[outside < _MARGIN], outside == 0.0
+        pieces, postures, lost = motions.follow(np.concatenate([starts, known]))
+        ranges, complete = pieces[:, :2], inside.any() and not lost[: len(starts)].any()
+        agreed = bool(complete and (_counts(ranges, values) == inside.sum(axis=1)).all())
+        return Sweep(motions, ranges, postures[:, 2], rows.reshape(-1, 7), outside.ravel(), agreed)
+
+    def _motions(self, problem: SolverInput) -> Motions:
+        """The self-motions of a target, none of which has been followed."""
+        setting = np.zeros(SETTING)
+        setting[JOINT] = self.given
+        return Motions(self.robot.model, problem.T, setting, _limits(problem), _MARGIN)
 
     def _of_nominal(self, problem: SolverInput) -> Array:
         """A configuration ``(k, 7)`` of the nominal arm inside each of its ranges, close to the arm's motions."""
@@ -266,8 +262,8 @@ class General7(ClosedForm):
 
         Where none is inside the limits, that of the solution that is least outside, or the seed's.
         """
-        p, i, (lower, upper) = problem, self.given, sweep.motions.limits
-        q = np.concatenate([sweep.rows, sweep.motions.inner, sweep.motions.points])
+        p, i, (lower, upper) = problem, self.given, _limits(problem)
+        q = np.concatenate([sweep.rows, sweep.inner, sweep.motions.points])
         squares, least = np.empty(len(q)), math.inf
         to_images(q, p.seed, lower, upper, squares)
         best = float(p.seed[i])
@@ -312,8 +308,7 @@ class General7(ClosedForm):
 
     def _end(self, problem: SolverInput, row: Array, sense: float) -> float:
         """The end of the self-motion from a solution inside the limits."""
-        lower, upper = (np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (problem.lower, problem.upper))
-        return float(end_of_motion(self.robot.model, problem.T, self.given, sense, row, lower, upper))
+        return float(end_of_motion(self.robot.model, problem.T, self.given, sense, row, *_limits(problem)))
 
     def _ranges(self, problem: SolverInput, out: Array) -> Array:
         """The range of the given joint around each solution ``(rows, 7)`` that is inside the limits."""
@@ -329,10 +324,9 @@ class General7(ClosedForm):
     def _all_ranges(self, problem: SolverInput, sweep: Sweep | None) -> Array:
         """The values ``(k, 2)`` of the given joint at which any solution is inside the limits."""
         p, i = problem, self.given
-        motions = (sweep or self.sweeper.sweep(p)).motions
-        if motions.joint != i:
-            motions = Motions(self.robot, p, i, motions.inner)
-        ranges, least, most = motions.ranges, float(p.lower[i]), float(p.upper[i])
+        sweep = sweep or self.sweeper.sweep(p)
+        ranges = sweep.ranges if self.sweeper is self else self._motions(p).follow(sweep.inner)[0][:, :2]
+        least, most = float(p.lower[i]), float(p.upper[i])
         if not len(ranges):
             return ranges
         if not most - least < UNBOUNDED:

@@ -28,7 +28,7 @@ from kin.solvers.reversed import ReversedJoints, WrappedKernels
 from kin.solvers.rounded.closed_form import Flags, Rounded
 from kin.solvers.rounded.ends import joined, move_ends
 from kin.solvers.rounded.rows import choose_rows, move_rows
-from kin.solvers.selfmotion.following import Followed
+from kin.solvers.selfmotion.following import Motions
 from kin.solvers.selfmotion.points import FRAME, JOINT, MOST, OFF, SETTING, SPAN, WANTED, set_frame
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -116,8 +116,7 @@ class Rounded7(Rounded):
         p = SolverInput(fk(self.robot, q), POSE, _FREE, True, q, self.robot.lower.copy(), self.robot.upper.copy())
         self.solve(p)
         self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
-        found = Followed()
-        found.follow(self.robot.model, p.T, self._set(p), self._widened(p), self._move, np.array([q]))
+        Motions(self.robot.model, p.T, self._set(p), self._widened(p), self._move).follow(np.array([q]))
 
     def _in_one_turn(self, problem: SolverInput) -> SolverInput:
         """The same with contiguous arrays, and the limits of the parameter's joint at most one turn apart."""
@@ -291,7 +290,7 @@ class Rounded7(Rounded):
         """
         sure = moved[2][moved[0][:, 0].astype(int)] > 0.0
         arcs, places, certain = [(a, b, c) for a, b, c in moved[0][sure].tolist()], list(moved[1][sure]), True
-        found = Followed()
+        motions = Motions(self.robot.model, p.T, setting, limits, 3.0 * self._move)
         for intervals, shares in ((inner, _MIDDLE), (outer, _SHARES)):
             doubtful = intervals[moved[2][intervals[:, 0].astype(int)] == 0.0]
             values = (doubtful[:, 1:2] + shares * (doubtful[:, 2:] - doubtful[:, 1:2])).ravel().tolist()
@@ -303,8 +302,7 @@ class Rounded7(Rounded):
             starts = self._beside_folds(starts[begun], merged[whose])
             if not len(starts):
                 continue
-            count, lost = found.follow(self.robot.model, p.T, setting, limits, 3.0 * self._move, starts)
-            pieces, postures = found.pieces[:count], found.postures[:count]
+            pieces, postures, lost = motions.follow(starts)
             branches, clear = self._whose(p, pieces, postures)
             certain &= clear
             for branch, piece, posture in zip(branches, pieces.tolist(), postures, strict=True):

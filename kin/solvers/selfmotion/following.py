@@ -1,4 +1,4 @@
-"""What following the self-motions of one target finds, collected for Python."""
+"""Self-motions that have been followed, for Python."""
 
 from __future__ import annotations
 
@@ -13,35 +13,33 @@ from kin.solvers.selfmotion.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.transforms import Array
 
 
-class Followed:
-    """The self-motions of one target that have been followed.
+class Motions:
+    """The self-motions of one target that have been followed, as far as they come close to keeping the limits.
 
-    Attributes:
-        pieces, postures: what `follow` has found last: ends of feasible pieces and a value inside ``(PIECES, 3)``,
-            and the postures there ``(PIECES, 3, 7)``.
-        paths: the curves.
+    Args:
+        model, T, setting, limits, margin: as for `trace`.
     """
 
-    def __init__(self) -> None:
-        self.pieces, self.postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
-        self.paths = Paths(np.empty((PATHS, 14)), np.zeros(1 + CURVES, dtype=np.int64))
+    def __init__(self, model: Array, T: Array, setting: Array, limits: Array, margin: float) -> None:
+        self._goal = model, T, setting, limits, margin
+        self._paths = Paths(np.empty((PATHS, 14)), np.zeros(1 + CURVES, dtype=np.int64))
 
-    def follow(
-        self, model: Array, T: Array, setting: Array, limits: Array, margin: float, starts: Array
-    ) -> tuple[int, NDArray[np.bool_]]:
-        """How many pieces of the curves through postures ``(k, 7)`` are now in `pieces` and `postures`.
+    def follow(self, starts: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """The feasible pieces of those through postures ``(k, 7)`` that are on none of the motions so far.
 
-        Also returns ``(k,)`` which curves were lost, see `trace`.
+        Returns:
+            Their ends and a value inside ``(m, 3)``, the postures there ``(m, 3, 7)``, and ``(k,)`` which motions
+            were lost, see `trace`.
         """
-        goal, starts = (model, T, setting, limits, margin), starts.copy()
-        count = _trace()(*goal, starts, self.paths, self.pieces, self.postures)
-        return count, np.isnan(starts[:, 0])
+        pieces, postures, starts = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7)), starts.copy()
+        count = _trace()(*self._goal, starts, self._paths, pieces, postures)
+        return pieces[:count], postures[:count], np.isnan(starts[:, 0])
 
     @property
     def points(self) -> Array:
-        """Points ``(m, 7)`` of all curves, curve after curve."""
-        count, *ends = self.paths.ends.tolist()
-        return self.paths.points[: ends[count - 1] if count else 0, :7]
+        """Points ``(m, 7)`` of all motions, one after the other."""
+        count, *ends = self._paths.ends.tolist()
+        return self._paths.points[: ends[count - 1] if count else 0, :7]
 
 
 @cache

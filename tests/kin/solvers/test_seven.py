@@ -320,14 +320,14 @@ def test_what_is_agreed_is_all_that_a_scan_finds():
     values = np.linspace(SAWYER.lower[6], SAWYER.upper[6], 302)[1:-1]
     for q in SAWYER.random_q(rng, 4):
         T = kin.fk(SAWYER, q)
-        result, motions = kin.solve_ik(SAWYER, T), form.sweep(problem_at(SAWYER, T)).motions
+        result, sweep = kin.solve_ik(SAWYER, T), form.sweep(problem_at(SAWYER, T))
         rows = kin.ik_branches(SAWYER, np.broadcast_to(T, (len(values), 4, 4)), values)
         inside = ((rows - SAWYER.lower) % (2 * PI) <= SAWYER.upper - SAWYER.lower).all(axis=2)
         claimed = [any(low <= value <= high for low, high in result.redundancy[0].intervals) for value in values]
         assert result.completeness == "agreed"
         assert np.array_equal(inside.any(axis=1), claimed)
-        assert np.array_equal(inside.sum(axis=1), motions.counts(values))
-        assert motions.have(np.ascontiguousarray(rows[inside]))
+        assert np.array_equal(inside.sum(axis=1), general7.closed_form._counts(sweep.ranges, values))
+        assert sweep.have(np.ascontiguousarray(rows[inside]))
 
 
 def test_what_only_one_of_two_ways_finds_is_not_agreed(monkeypatch):
