@@ -80,7 +80,7 @@ def compiler() -> tuple[list[str], str]:
 
 
 def options_for(level: str, system: str, zig: bool) -> list[str]:
-    """What the compiler is told for a level of processors and a system."""
+    """Options of the compiler for a level of processors and a system."""
     options = [*FLAGS, *LEVELS[level], *(() if system == WINDOWS else ("-fPIC",))]
     if zig:
         return [f"--target={level.partition('_v')[0]}-{system}", *options]

@@ -13,7 +13,7 @@ from kin.codegen.extension import build, wrappers
 from kin.kernels import ahead
 
 LEVEL = "x86_64_v2"
-pytestmark = pytest.mark.skipif(LEVEL not in ahead.levels(), reason="gcc is told a level of x86-64")
+pytestmark = pytest.mark.skipif(LEVEL not in ahead.levels(), reason="a level of x86-64")
 
 
 def texts(**changed):
