@@ -10,6 +10,7 @@ seconds; it is kept in the user's cache folder.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import platform
@@ -156,6 +157,8 @@ def built(core: Path, level: str) -> Path:
     if index.exists():
         known, _, name = index.read_text("utf-8").partition("\n")
         if known == state and (file := folder / name).exists():
+            with contextlib.suppress(OSError):  # a folder that is only read
+                os.utime(file)  # it is used
             return file
     command = [sys.executable, "-m", BUILDER, str(folder), "--level", level]
     environment = os.environ | {"KINBOARD_KERNELS": PYTHON, "PYTHONPATH": str(core.parent)}

@@ -12,6 +12,7 @@ was asked not to, and its loops are slower. With ``ziglang`` any machine builds 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import hashlib
 import importlib.util
 import os
@@ -38,8 +39,8 @@ FLAGS = (
     *("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined"),
     *("-fvisibility=hidden", "-w"),
 )
-# Without it loops are up to 1.4 times slower than for the processor at hand. As `-mtune`, ziglang would take it for the
-# processor itself, and use instructions that others do not have.
+# Without it loops are up to 1.4 times slower than for the processor at hand. As `-mtune`, ziglang would take it for
+# the processor itself, and use instructions that others do not have.
 _TUNED = ("-Xclang", "-tune-cpu", "-Xclang", "znver4")
 LEVELS: Mapping[str, tuple[str, ...]] = {
     "x86_64_v2": ("-march=x86_64_v2",),
@@ -49,6 +50,7 @@ LEVELS: Mapping[str, tuple[str, ...]] = {
 }
 LINUX, MACOS, WINDOWS = "linux-gnu.2.17", "macos.11.0", "windows-gnu"
 _LINKED: Mapping[str, tuple[str, ...]] = {LINUX: ("-lm",), MACOS: ("-Wl,-undefined,dynamic_lookup",), WINDOWS: ()}
+UNUSED = 30 * 86400.0  # s: what is kept and was not used for so long is removed
 Say = Callable[[str], object]
 
 
@@ -187,6 +189,14 @@ def _kept(file: Path, make: Callable[[Path], object]) -> Path:
     return file
 
 
+def prune(folder: Path) -> None:
+    """Remove what was not used for `UNUSED` seconds."""
+    for file in folder.rglob("*.*"):
+        with contextlib.suppress(FileNotFoundError):  # another process has removed it
+            if time.time() - file.stat().st_mtime > UNUSED:
+                file.unlink()
+
+
 def _hash(*parts: object) -> str:
     return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
 
@@ -210,6 +220,7 @@ def main() -> int:
 
     try:
         print(build(texts(given.folder / "texts", say), given.folder, given.level, given.system, say))
+        prune(given.folder)
     except (BuildError, OutsideSubsetError) as error:
         print(f"\n{error}", file=sys.stderr)
         return 1

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sysconfig
+import time
 from pathlib import Path
 
 import pytest
@@ -74,3 +76,13 @@ def test_declarations_are_those_of_pythons_headers(tmp_path):
     define = ["-DPy_LIMITED_API=0x030b0000", "-DKINBOARD_PYTHON_H=<Python.h>", f"-I{headers}"]
     command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *define, "-c", "module.c"]
     subprocess.run(command, cwd=tmp_path, check=True)
+
+
+def test_what_is_used_no_more_is_removed(tmp_path):
+    for name, age in (("old", build.UNUSED + 60.0), ("new", build.UNUSED - 3600.0)):
+        file = tmp_path / "objects" / f"{name}.o"
+        file.parent.mkdir(exist_ok=True)
+        file.touch()
+        os.utime(file, (0.0, time.time() - age))
+    build.prune(tmp_path)
+    assert [file.name for file in tmp_path.rglob("*.o")] == ["new.o"]
