@@ -39,8 +39,8 @@ FLAGS = (
     *("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-sanitize=undefined"),
     *("-fvisibility=hidden", "-w"),
 )
-# Without it loops are up to 1.4 times slower than for the processor at hand. As `-mtune`, ziglang would take it for
-# the processor itself, and use instructions that others do not have.
+# Without it loops are up to 1.4 times slower than for the processor at hand. As `-mtune`, ziglang would take it
+# for the processor itself, and use instructions that others do not have.
 _TUNED = ("-Xclang", "-tune-cpu", "-Xclang", "znver4")
 LEVELS: Mapping[str, tuple[str, ...]] = {
     "x86_64_v2": ("-march=x86_64_v2",),
