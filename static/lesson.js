@@ -18,7 +18,7 @@
   function press(button) {
     if (button.ariaDisabled === "true") return;
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
-    if (kind === "restart" && !button.closest("[data-feature]")) keepDrafts(drafts.filter(([each]) => !each.startsWith(`${lessonOnShow()} `)));
+    if (kind === "restart" && !button.closest("[data-feature]")) keepDrafts(drafts.filter(([each]) => !each.startsWith(`${placeOf(button)} `)));
     if (kind === "check") check(button);
     else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")), ...(key === undefined ? [] : [key]));
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
@@ -76,11 +76,11 @@
     drafts = now.slice(0, MOST_DRAFTS);
     try { sessionStorage.setItem(DRAFTS, JSON.stringify(drafts)); } catch { /* only this page has it */ }
   }
-  const lessonOnShow = () => document.querySelector("[data-guide=goal]")?.dataset.lesson;
-  /** The question of a typed cell, with its words in a lesson, with its variant in an exercise; undefined: it is no answer. */
+  const placeOf = (node) => node.closest("[data-of]")?.dataset.of;
+  /** The question of a typed cell, with arm and words in a lesson, with its variant in an exercise; undefined: it is no answer. */
   function questionOf(cell) {
     const asked = cell.closest("[data-question]");
-    return asked ? `${lessonOnShow()} ${asked.dataset.question} ${asked.querySelector("legend")?.textContent}` : cell.closest("[data-of]")?.dataset.of;
+    return asked ? `${placeOf(cell)} ${asked.dataset.question} ${asked.querySelector("legend")?.textContent}` : placeOf(cell);
   }
   const draftOf = (question) => drafts.find(([each]) => each === question)?.[1];
   addEventListener("input", ({ target }) => {

@@ -57,6 +57,7 @@ def assign_html(attempt: Attempt, units: Units) -> str:
         title = "Your table is complete"
     return render(
         "dh/assign",
+        arm=work.robot.id,
         title=title,
         words=_finished(work, units) if done else choices.relation_words(work, number),
         settled=settled,

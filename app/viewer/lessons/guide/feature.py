@@ -377,7 +377,8 @@ class Guide(Feature):
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
         offered = self.stage.store.get(self._offered).name if self._offered else ""
         sheets = {key: self._sheet(key) for key in open_}
-        update_html(self._steps, views.steps_html(progress, sheets, offered, self._leading_on()))
+        of = f"{self._lesson.key} {self.stage.now.robot.id}"
+        update_html(self._steps, views.steps_html(progress, sheets, of, offered, self._leading_on()))
         forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
         self._draw_answer()

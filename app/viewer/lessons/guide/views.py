@@ -24,12 +24,13 @@ def goal_html(lesson: str, goal: str) -> str:
 
 
 def steps_html(
-    progress: Progress, sheets: dict[str, Sheet], arm: str = "", following: Following | None = None
+    progress: Progress, sheets: dict[str, Sheet], of: str = "", arm: str = "", following: Following | None = None
 ) -> str:
     """The step on show, or the check.
 
     Args:
         sheets: what was entered, by the key of the question.
+        of: names the lesson and the arm: what is typed for one arm is nothing for another one.
         arm: the name of the arm that the step offers instead of this one.
         following: the button that leads on after a check that was passed.
     """
@@ -48,6 +49,7 @@ def steps_html(
         )
         return render(
             "guide/check",
+            of=of,
             marks=marks,
             at=at,
             questions=asked,
@@ -64,6 +66,7 @@ def steps_html(
     estimate = step.estimate if not closed or progress.mark(before) != "open" else None
     return render(
         "guide/step",
+        of=of,
         marks=marks,
         at=at,
         step=step,

@@ -2,7 +2,7 @@
 // Runs static/lesson.js in a page with one typed question, and prints what stands in its field in the end of each case.
 // Usage: node drafts.js FOLDER_OF_SCRIPTS < cases.json
 //
-// A case is a list of steps, a step ["ask", { lesson, question, prompt, value, invalid }] or ["ask", { of, value }]: the page shows another question,
+// A case is a list of steps, a step ["ask", { lesson, arm, question, prompt, value, invalid }] or ["ask", { of, value }]: the page shows another question,
 // of a lesson or an exercise; ["type", text], ["press", kind], ["answered", error] for all that was sent, or ["reload"].
 const fs = require("node:fs");
 const path = require("node:path");
@@ -73,7 +73,7 @@ function ask(one) {
   );
   root = new Element("body", {}, one.of
     ? [new Element("section", { "data-of": one.of, "data-feature": "exercises" }, [block])]
-    : [new Element("p", { "data-guide": "goal", "data-lesson": one.lesson }), new Element("section", {}, [block, button("restart")])]);
+    : [new Element("section", { "data-of": `${one.lesson} ${one.arm}` }, [block, button("restart")])]);
   for (const act of watchers) act();
 }
 const cell = () => root.querySelector("[data-cell]");

@@ -11,8 +11,8 @@ import playwright
 
 NODE = Path(playwright.__file__).parent / "driver" / "node"
 STATIC = Path(__file__).parents[4] / "static"
-ASK = {"lesson": "Equations", "question": "2", "prompt": "How far?"}
-OTHER = {"lesson": "Velocity", "question": "1", "prompt": "How fast?"}
+ASK = {"lesson": "Equations", "arm": "ur5", "question": "2", "prompt": "How far?"}
+OTHER = {"lesson": "Velocity", "arm": "ur5", "question": "1", "prompt": "How fast?"}
 EXERCISE = {"of": "two-elbows 7"}
 
 
@@ -36,6 +36,13 @@ def test_what_was_not_sent_is_there_again() -> None:
         "7",
     ]
     assert typed([*begun, ["ask", {**ASK, "value": "6"}]]) == ["6"], "the service says otherwise"
+
+
+def test_the_same_question_about_another_arm_has_a_draft_of_its_own() -> None:
+    panda = {**ASK, "arm": "panda"}
+    begun: Case = [["ask", ASK], ["type", "7"], ["ask", panda]]
+    back: Case = [*begun, ["type", "8"], ["ask", ASK]]
+    assert typed(begun, back, [*back, ["press", "restart"], ["ask", panda]]) == ["", "7", "8"]
 
 
 def test_what_the_service_has_is_no_draft_of_another_question_with_the_same_words() -> None:
