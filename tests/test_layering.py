@@ -82,7 +82,9 @@ RULES: dict[str, set[str]] = {
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
     "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom", "kin.parsing"},
-    "app/classroom/results": {"kin", "sqlalchemy", "app.classroom", "app.shared.spreadsheets"},
+    "app/classroom/results": {
+        *("kin", "sqlalchemy", "app.classroom", "app.exercises.questions", "app.shared.spreadsheets"),
+    },
     "app/live": {"kin", "app.classroom.tokens", "app.live", "app.shared.problems"},
     # A program's end of the line needs nothing of the service.
     "app/live/client": {"kin", "numpy", "websockets", "app.live.client", "app.live.recording"},

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.classroom.clock import now
 from app.classroom.live import LiveRoom, Place
-from app.classroom.views import Confirmed, NewAttempt, RefusedError, RoomView, Ticket
+from app.classroom.views import Confirmed, NewAttempt, Recalled, RefusedError, RoomView, Ticket
 
 if TYPE_CHECKING:
     from app.classroom.rooms import Rooms, Swept
@@ -82,6 +82,11 @@ class Attendance:
         """A secret of the seat, from which the numbers of its exercises follow; raises `ClassroomUnavailable`."""
         self._only_student()
         return self._rooms.tokens.secret(self.ticket)
+
+    def tell_recalled(self, more: Recalled) -> None:
+        """More answers of *Review*, besides those before."""
+        self._only_student()
+        self._live.report_recalled(self.ticket.seat, more)
 
     def submit(self, attempt: NewAttempt) -> Confirmed:
         """Store an attempt; returns when it is stored for good.

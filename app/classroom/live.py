@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.classroom.clock import steady
-from app.classroom.views import BUSY, ClassroomUnavailable, Poll, RoomView, SeatView, Shown, Task, Ticket
+from app.classroom.views import BUSY, ClassroomUnavailable, Poll, Recalled, RoomView, SeatView, Shown, Task, Ticket
 
 logger = logging.getLogger("kinboard.classroom")
 
@@ -24,7 +24,7 @@ AWAY = 7.0  # seconds without a sign of a page's browser, which is asked for one
 REMOVED = "The teacher has removed you."
 MOST_OWN = 40_000  # characters of the texts of own exercises: the state is stored with each change of it
 MOST_VERSIONS = 4  # of one of them
-REPORTED = ("hand", "task", "gone", "driven", "voted", "vote", "page", "beat")  # columns of a seat
+REPORTED = ("hand", "task", "gone", "driven", "recalled", "voted", "vote", "page", "beat")  # columns of a seat
 
 
 @dataclass
@@ -161,6 +161,12 @@ class LiveRoom:
             self._report_seat(seat, columns)
         self.notify()
 
+    def report_recalled(self, seat: str, more: Recalled) -> None:
+        """What a student was asked again, on top of what was reported before."""
+        with self.lock:
+            known = self.seats.get(seat, {}).get("recalled", ())
+            self._report_seat(seat, {"recalled": [*more.plus(known)]})
+
     def _report_seat(self, seat: str, columns: Mapping[str, object]) -> None:
         row = self.seats.get(seat)
         if row is None or not _there(row) or self.closed or columns.items() <= row.items():
@@ -275,6 +281,7 @@ class LiveRoom:
                 poll=self._poll(present, mine),
                 course=state.get("course") or "",
                 course_at=float(state.get("course_at") or 0.0),
+                exchanged=mine is not None and self._number(mine) % 2 == 0,
                 own={} if ticket.seat else {key: tuple(texts) for key, texts in (state.get("own") or {}).items()},
                 teacher_away="" in self.away,
                 students=len(present),
@@ -282,6 +289,11 @@ class LiveRoom:
                 seats=seats,
                 problem=self.problem,
             )
+
+    def _number(self, seat: Mapping[str, Any]) -> int:
+        """1 for who joined first; those who were removed count too, so it never changes."""
+        place = seat["joined"], seat["id"]
+        return sum((row["joined"], row["id"]) <= place for row in self.seats.values())
 
     def _seat(self, row: Mapping[str, Any]) -> SeatView:
         names = ("id", "alias", "hand", "task", "gone", "driven", "work", "page")

@@ -9,7 +9,7 @@ import contextlib
 import sqlite3
 from pathlib import Path
 
-REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006")  # of this version, in their order
+REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008")  # of this version, in their order
 
 
 def revision_of(file: Path) -> str | None:

@@ -60,6 +60,7 @@ _BLANK: dict[str, Any] = {
     "page": "",
     "gone": False,
     "driven": "",
+    "recalled": [],
 }
 
 

@@ -66,6 +66,7 @@ class Seat(Base):
         solved, version: of earlier versions; not read any more.
         gone: whether the student has stopped following.
         driven: what a program drives with the arm of the page, or empty.
+        recalled: counts of answers in *Review*, as `app.classroom.views.Recalled` has them; empty: there are none.
         voted: id of the poll that `vote` belongs to.
         beat: 0 until a page of this seat has come.
         removed: by the teacher; alias, page and attempts are then erased.
@@ -89,10 +90,15 @@ class Seat(Base):
     removed: Mapped[bool] = mapped_column(default=False, server_default=false())
     gone: Mapped[bool] = mapped_column(default=False, server_default=false())
     driven: Mapped[str] = mapped_column(Text, default="", server_default="")
+    recalled: Mapped[list[int]] = mapped_column(JSON, default=list, server_default=text("'[]'"))
 
 
 class Attempt(Base):
-    """One answer to an exercise."""
+    """One answer to an exercise.
+
+    Attributes:
+        cause: the code of the mistake that led to it, or empty.
+    """
 
     __tablename__ = "attempt"
     __table_args__ = (Index("ix_attempt_room_id_at", "room_id", "at", "id"),)  # results are read in this order
@@ -107,6 +113,7 @@ class Attempt(Base):
     score: Mapped[float] = mapped_column(Double)
     started: Mapped[float] = mapped_column(Double)
     at: Mapped[float] = mapped_column(Double)
+    cause: Mapped[str] = mapped_column(String(60), default="", server_default="")
 
 
 class LtiRoom(Base):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import secrets
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import NamedTuple
 
 from app.classroom.work import ANSWER_SHOWN, Work
 
@@ -140,6 +142,8 @@ class RoomView:
         frozen: whether students may not move their arms.
         course: the packed course, or empty.
         course_at: when it was sent, in seconds since 1970; the same course sent again opens again.
+        exchanged: whether this student gets the exercises that the course compares in the other order, as every
+            second one in the order of joining does.
         own: the texts of the exercises that the teacher wrote and sent, by id, the newest at the end; empty for
             students.
         teacher_away: whether no page of the teacher is connected: the class is paused.
@@ -163,6 +167,7 @@ class RoomView:
     poll: Poll | None = None
     course: str = ""
     course_at: float = 0.0
+    exchanged: bool = False
     own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     teacher_away: bool = False
     students: int = 0
@@ -182,6 +187,7 @@ class NewAttempt:
         score: 0 to 1.
         started: when the student began, in seconds since 1970.
         id: made once per attempt: storing it again, after an error, stores nothing twice.
+        cause: of a wrong answer, the code of the mistake.
     """
 
     exercise: str
@@ -191,6 +197,7 @@ class NewAttempt:
     score: float
     started: float
     id: str = field(default_factory=lambda: secrets.token_hex(8))
+    cause: str = ""
 
     @property
     def gave_up(self) -> bool:
@@ -201,6 +208,24 @@ class NewAttempt:
     def given_up(cls, exercise: str, seed: int, started: float) -> NewAttempt:
         """The answer is to be shown."""
         return cls(exercise, seed, None, ANSWER_SHOWN, 0.0, started)
+
+
+class Recalled(NamedTuple):
+    """Counts of what was asked again in *Review*: of one answer, of a student or of a class.
+
+    Attributes:
+        late, late_right: what was asked seven days and more after the last answer, and how much of it was right.
+        new, new_right: the same of questions about an arm about which they were never asked before.
+    """
+
+    late: int = 0
+    late_right: int = 0
+    new: int = 0
+    new_right: int = 0
+
+    def plus(self, counts: Iterable[int]) -> Recalled:
+        """With other counts; none: they are zero."""
+        return Recalled(*map(sum, zip_longest(self, counts, fillvalue=0)))
 
 
 @dataclass(frozen=True)

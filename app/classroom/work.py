@@ -30,6 +30,7 @@ class Attempt:
         answer: plain data, as it was given, or the beginning of its JSON; None where it was not read.
         score: 0 to 1.
         started, at: seconds since 1970.
+        cause: of a wrong answer, the code of the mistake, as `app.exercises.questions.Verdict` has it.
     """
 
     seat: str
@@ -42,6 +43,7 @@ class Attempt:
     started: float
     at: float
     number: int = 0
+    cause: str = ""
 
     @property
     def gave_up(self) -> bool:

@@ -75,6 +75,15 @@ class Course:
         parts = [self.title, *(f"{item.kind}:{item.key}" for item in self.items), *(one.text for one in self.own)]
         return hashlib.sha256("\n".join(parts).encode()).digest()[:4]
 
+    def exchanged(self) -> Course:
+        """With the two exercises of each pair in each other's places, whose titles and notes stay."""
+        other = dict(zip((*self.before, *self.after), (*self.after, *self.before), strict=True))
+        items = tuple(
+            replace(item, key=other.get(item.key, item.key)) if item.kind == "exercise" else item
+            for item in self.items
+        )
+        return replace(self, items=items, before=self.after, after=self.before)
+
     def added(self, item: Item) -> Course:
         """With one more item, at the end."""
         return replace(self, items=(*self.items, item))

@@ -1,14 +1,22 @@
-"""Did they learn? What a course asks before and after, and the normalised gain between them.
+"""Did they learn? What a course asks before and after, and the gain between them.
 
-A course may pair exercises: one before, one after. A student's first answer to each counts: later ones follow a
-verdict, also with other numbers. Asking for the answer before giving one scores 0. With scores from 0 to 1, the
-normalised gain is (Hake, 1998)::
+A course may pair exercises of one difficulty. In a room, every second student gets the two of a pair in the
+other order. A student's first answer to each counts: later ones follow a verdict, also with other numbers. Asking
+for the answer before giving one scores 0. What a student has answered first is *before*.
+
+The gain of a class is the mean of after - before over the two orders, with the same weight. One of the exercises
+may be harder: this adds to the differences of one order what it takes from those of the other, and cancels. Within
+an order it is the same for all, so it is not in the interval either, which is that of Student's t for a two-period
+crossover (Senn, *Cross-over Trials in Clinical Research*, 2002, chapter 3); where all had the same order, that of
+paired differences. A bootstrap would be too narrow with so few students. Below `LEAST` of them, no gain is said.
+
+With scores from 0 to 1, the normalised gain is (Hake, 1998)::
 
     g = (after - before) / (1 - before)
 
 It is 1 if all that was missing has been gained, 0 if nothing has changed, and negative after a loss. It has no
 lower bound: the more a student knew before, the smaller is the divisor. If before is 1, there is no g. A class has
-the gain of its means over the students who answered both, including those who knew everything before.
+that of its means, including those who knew everything before.
 """
 
 from __future__ import annotations
@@ -16,17 +24,24 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from statistics import NormalDist, fmean
 
 from app.classroom.results.table import Member
 from app.classroom.work import Attempt
 from app.shared.spreadsheets import cell
 
-COLUMNS = ("student", "alias", "item", "before", "after", "score_before", "score_after", "gain", "students")
+COLUMNS = (
+    *("student", "alias", "item", "before", "after", "score_before", "score_after", "gain", "students"),
+    *("difference", "low", "high"),
+)
 ALL = "all"  # the item that stands for all of them
 CLASS = "class"  # the student who stands for all of them
 EXACT = 1e-9  # below this, nothing was missing before
+LEAST = 8  # students who answered both
+CONFIDENCE = 0.95
 
 Pair = tuple[str, str]  # ids of exercises
 
@@ -38,18 +53,38 @@ class Gain:
     Attributes:
         before, after: scores or means of scores, 0 to 1; None: not answered.
         students: how many answered both.
+        exchanged: whether a student has answered the second exercise of the pair first.
+        enough: whether there are enough students for a gain.
+        margin: of a class with enough students, half of the interval of after - before.
     """
 
     before: float | None
     after: float | None
     students: int
+    exchanged: bool = False
+    enough: bool = True
+    margin: float | None = None
+
+    @property
+    def difference(self) -> float | None:
+        """after - before; None: it is not defined."""
+        if self.before is None or self.after is None or not self.enough:
+            return None
+        return self.after - self.before
 
     @property
     def gain(self) -> float | None:
         """The normalised gain; None: it is not defined."""
-        if self.before is None or self.after is None or 1.0 - self.before < EXACT:
+        if self.before is None or self.difference is None or 1.0 - self.before < EXACT:
             return None
-        return (self.after - self.before) / (1.0 - self.before)
+        return self.difference / (1.0 - self.before)
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """That of after - before."""
+        if self.difference is None or self.margin is None:
+            return None
+        return self.difference - self.margin, self.difference + self.margin
 
 
 @dataclass(frozen=True)
@@ -61,24 +96,22 @@ class Gains:
     whole: Gain
 
 
-def first_scores(attempts: Iterable[Attempt]) -> dict[tuple[str, str], float]:
-    """The score of the first answer, by seat and exercise; attempts come in the order of time."""
-    found: dict[tuple[str, str], float] = {}
-    for one in attempts:
-        found.setdefault((one.seat, one.exercise), 0.0 if one.gave_up else one.score)
-    return found
-
-
 def gains(members: Iterable[Member], attempts: Iterable[Attempt], pairs: Sequence[Pair]) -> list[Gains]:
-    """The class first, then each student who has answered something of the pairs, in the order of joining."""
-    scores = first_scores(attempts)
+    """The class first, then each student who has answered something of the pairs, in the order of joining.
+
+    Args:
+        attempts: in the order of time.
+    """
+    scores: dict[tuple[str, str], tuple[int, float]] = {}  # of first answers, with their places in this order
+    for one in attempts:
+        scores.setdefault((one.seat, one.exercise), (len(scores), 0.0 if one.gave_up else one.score))
     rows: list[Gains] = []
     for member in sorted(members, key=lambda one: one.number):
-        items = tuple(_gain(*(scores.get((member.seat, key)) for key in pair)) for pair in pairs)
-        if any(one.before is not None or one.after is not None for one in items):
-            rows.append(Gains(member, items, _mean(items, 1)))
-    together = tuple(_mean([row.items[i] for row in rows]) for i in range(len(pairs)))
-    whole = _mean([row.whole for row in rows])
+        items = tuple(_gain([scores.get((member.seat, key)) for key in pair]) for pair in pairs)
+        if any(one.before is not None for one in items):
+            rows.append(Gains(member, items, _of_student(items)))
+    together = tuple(_of_class([row.items[i] for row in rows]) for i in range(len(pairs)))
+    whole = _of_class([row.whole for row in rows])
     return [Gains(None, together, whole), *rows]
 
 
@@ -90,9 +123,12 @@ def csv_of_gains(found: Iterable[Gains], pairs: Sequence[Pair]) -> str:
     for row in found:
         who = (CLASS, "") if row.member is None else (row.member.number, cell(row.member.alias))
         for i, one in enumerate((*row.items, row.whole)):
-            item: tuple[object, ...] = (i + 1, *pairs[i]) if i < len(pairs) else (ALL, "", "")
-            numbers = ("" if value is None else f"{value:.3f}" for value in (one.before, one.after, one.gain))
-            writer.writerow([*who, *item, *numbers, one.students])
+            pair = pairs[i][:: -1 if one.exchanged else 1] if i < len(pairs) else ("", "")
+            item = (i + 1 if i < len(pairs) else ALL, *pair)
+            scores = _numbers(one.before, one.after, one.gain)
+            writer.writerow(
+                [*who, *item, *scores, one.students, *_numbers(one.difference, *(one.interval or (None, None)))]
+            )
     return text.getvalue().encode("utf-8", "replace").decode()
 
 
@@ -102,18 +138,66 @@ def pairs_of(packed: str) -> list[Pair]:
     return list(zip(data.get("before", ()), data.get("after", ()), strict=True))
 
 
-def _gain(before: float | None, after: float | None) -> Gain:
-    return Gain(before, after, int(before is not None and after is not None))
+def exercises_of(packed: str) -> list[str]:
+    """The ids of its exercises, each once, in order."""
+    items = json.loads(packed).get("item", ()) if packed else ()
+    return list(dict.fromkeys(item["exercise"] for item in items if "exercise" in item))
 
 
-def _mean(items: Sequence[Gain], students: int | None = None) -> Gain:
-    """The comparison of the means, over what has both.
+def _gain(scores: Sequence[tuple[int, float] | None]) -> Gain:
+    """Of the places and scores of a student's first answers to a pair."""
+    found = sorted(one for one in scores if one is not None)
+    before, after = (found[i][1] if i < len(found) else None for i in range(2))
+    return Gain(before, after, int(after is not None), bool(found) and found[0] == scores[1])
 
-    Args:
-        students: how many they are of, if there is any; None: the sum of theirs.
-    """
-    both = [(one.before, one.after) for one in items if one.before is not None and one.after is not None]
+
+def _of_student(items: Sequence[Gain]) -> Gain:
+    """The comparison of the means over the pairs of which both were answered; the first of them has the order."""
+    both = [one for one in items if one.after is not None]
     if not both:
         return Gain(None, None, 0)
-    before, after = (sum(column) / len(both) for column in zip(*both, strict=True))
-    return Gain(before, after, sum(one.students for one in items) if students is None else students)
+    before, after = _means(both)
+    return replace(both[0], before=before, after=after)
+
+
+def _of_class(found: Sequence[Gain]) -> Gain:
+    """The comparison of those who answered both, each order with the same weight."""
+    both = [one for one in found if one.after is not None]
+    orders = [
+        order for exchanged in (False, True) if (order := [one for one in both if one.exchanged == exchanged])
+    ]
+    if not orders:
+        return Gain(None, None, 0, enough=False)
+    before, after = (fmean(column) for column in zip(*map(_means, orders), strict=True))
+    if len(both) < LEAST:
+        return Gain(before, after, len(both), enough=False)
+    differences = [[one.difference or 0.0 for one in order] for order in orders]
+    freedom = len(both) - len(orders)
+    squares = sum((each - fmean(order)) ** 2 for order in differences for each in order)
+    error = math.sqrt(squares / freedom * sum(1.0 / len(order) for order in orders)) / len(orders)
+    return Gain(before, after, len(both), margin=t_quantile(0.5 + CONFIDENCE / 2.0, freedom) * error)
+
+
+def _means(both: Sequence[Gain]) -> tuple[float, float]:
+    """The means before and after, of comparisons that have both."""
+    return fmean(one.before or 0.0 for one in both), fmean(one.after or 0.0 for one in both)
+
+
+def t_quantile(probability: float, freedom: int) -> float:
+    """Of Student's distribution, by the expansion in 1/freedom; right to 0.001 from six degrees of freedom on.
+
+    Abramowitz and Stegun, *Handbook of Mathematical Functions*, 26.7.5.
+    """
+    z = NormalDist().inv_cdf(probability)
+    terms = (
+        z,
+        (z**3 + z) / 4.0,
+        (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0,
+        (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0,
+        (79.0 * z**9 + 776.0 * z**7 + 1482.0 * z**5 - 1920.0 * z**3 - 945.0 * z) / 92160.0,
+    )
+    return sum(term / float(freedom) ** k for k, term in enumerate(terms))
+
+
+def _numbers(*values: float | None) -> list[str]:
+    return ["" if value is None else f"{value:.3f}" for value in values]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from itertools import chain
 
 from sqlalchemy import Text, cast, func, literal, select, tuple_
@@ -13,6 +14,7 @@ from app.classroom.live import came
 from app.classroom.results.table import Member
 from app.classroom.tables import Attempt as Stored
 from app.classroom.tables import Room, Seat
+from app.classroom.views import Recalled
 from app.classroom.work import SHOWN_ANSWER, Attempt
 
 PAGE = 100  # attempts that are read at a time; each has up to 20 000 characters of an answer
@@ -34,6 +36,13 @@ def members_of(database: Database, room: str) -> list[Member]:
         for number, seat in enumerate(seats, 1)
         if not seat.removed
     ]
+
+
+def recalled_of(database: Database, room: str) -> Recalled:
+    """What the present students of a room were asked again."""
+    query = select(Seat.recalled).where(Seat.room_id == room, Seat.removed.is_(False))
+    with database.read() as connection:
+        return reduce(Recalled.plus, connection.scalars(query), Recalled())
 
 
 @dataclass(frozen=True)
@@ -82,6 +91,7 @@ def pages_of(database: Database, room: str, answers: bool = True, size: int = PA
             Stored.score,
             Stored.started,
             Stored.at,
+            Stored.cause,
             Stored.id,
         )
         .join(Seat, Seat.id == Stored.seat_id)
@@ -95,7 +105,9 @@ def pages_of(database: Database, room: str, answers: bool = True, size: int = PA
         with database.read() as connection:
             rows = connection.execute(after).all()
         if rows:
-            yield [replace(Attempt(*row[:-1]), number=numbers.get(row.seat_id, 0)) for row in rows]
+            yield [
+                replace(Attempt(*row[:-2]), number=numbers.get(row.seat_id, 0), cause=row.cause) for row in rows
+            ]
         if len(rows) < size:
             return
         after = query.where(place > tuple_(literal(rows[-1].at), literal(rows[-1].id)))

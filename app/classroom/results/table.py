@@ -26,6 +26,7 @@ COLUMNS = (
     "seconds",
     "seat",
     "state",
+    "cause",
 )
 
 
@@ -127,6 +128,7 @@ def csv_of(pages: Iterable[Iterable[Attempt]], titles: Mapping[str, str]) -> Ite
                     f"{max(0.0, one.at - one.started):.0f}",
                     one.number,
                     work.progress,
+                    one.cause,
                 ]
             )
         yield _lines(rows)

@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import Final, NamedTuple, Protocol
 
 from app.classroom.courses import Course, Courses
+from app.classroom.views import Recalled
 from app.classroom.work import Work
 from app.exercises import Exercise, Shelf, Verdict
 from app.viewer.activity.context import ExerciseContext
@@ -75,6 +76,9 @@ class Seat(Protocol):
 
     def submit(self, judged: Judged) -> None:
         """Store an answer that was judged while the right one was not on show."""
+
+    def tell_recalled(self, more: Recalled) -> None:
+        """Count what was asked again."""
 
     def give_up(self, one: GivenUp) -> bool:
         """Store that the answer is shown to a student who has not found it; False: it must not be shown now."""
@@ -245,11 +249,17 @@ class Activity:
         Only exercises of the service do; others may be gone by then.
         """
         if self.courses.exercises.get(exercise.id) is not None:
-            self.review.take(exercise.id, right)
+            self._take_again(exercise.id, right)
 
     def take_question(self, lesson: str, question: str, robot_id: str, right: bool) -> None:
         """A question of a lesson was answered about this arm, or its answer shown."""
-        self.review.take(question_key(lesson, question), right, robot_id)
+        self._take_again(question_key(lesson, question), right, robot_id)
+
+    def _take_again(self, key: str, right: bool, robot: str = "") -> None:
+        recalled = self.review.recalled(key, right, robot)
+        self.review.take(key, right, robot)
+        if recalled is not None and self._seat is not None:
+            self._seat.tell_recalled(recalled)
 
     def pass_lesson(self, key: str, robot_id: str) -> None:
         """The check of a lesson was passed on this arm."""

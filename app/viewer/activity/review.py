@@ -16,10 +16,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+from app.classroom.views import Recalled
 from app.viewer.activity.context import LABEL
 
 INTERVALS: Final = (1, 3, 7)  # days
 MOST_MISSED: Final = 60  # in a list
+MOST_ARMS: Final = 4  # that are known of a question, beside the present one
 FARTHEST_ZONE: Final = 14 * 60  # minutes from UTC
 _DAY = 86_400  # s
 _LATEST = 10**6  # day
@@ -41,12 +43,21 @@ class Missed:
         stage: how often it was right since, on days when it was due.
         due: the day from which it is asked again, counted from 1 January 1970.
         robot: the id of the arm that the question of a lesson is about.
+        before: the ids of the arms that it was about before, the last first, `MOST_ARMS` at most.
     """
 
     key: str
     stage: int
     due: int
     robot: str = ""
+    before: tuple[str, ...] = ()
+
+    def about(self, robot: str) -> Missed:
+        """The same about another arm."""
+        if robot == self.robot:
+            return self
+        before = tuple(dict.fromkeys((self.robot, *self.before)))[:MOST_ARMS]
+        return replace(self, robot=robot, before=before)
 
     @property
     def lesson(self) -> str:
@@ -101,7 +112,8 @@ class Review:
         """
         known, today = self.missed.get(key), self.today
         if not right:
-            new = Missed(key, 0, today + INTERVALS[0], robot)
+            asked = Missed(key, 0, 0, robot) if known is None else known.about(robot)
+            new = replace(asked, stage=0, due=today + INTERVALS[0])
         elif known is None or known.due > today or known.robot != robot:
             return False
         elif known.stage + 1 < len(INTERVALS):
@@ -119,7 +131,16 @@ class Review:
 
     def move(self, key: str, robot: str) -> None:
         """A question of a lesson is asked about another arm."""
-        self.missed[key] = replace(self.missed[key], robot=robot)
+        self.missed[key] = self.missed[key].about(robot)
+
+    def recalled(self, key: str, right: bool, robot: str = "") -> Recalled | None:
+        """What an answer says of what is remembered, before `take` has it; None: not due, or another arm."""
+        known = self.missed.get(key)
+        if known is None or known.due > self.today or known.robot != robot:
+            return None
+        late = self.today - (known.due - INTERVALS[known.stage]) >= INTERVALS[-1]
+        new = bool(known.before) and robot not in known.before
+        return Recalled(int(late), int(late and right), int(new), int(new and right))
 
     @property
     def due(self) -> list[Missed]:
@@ -137,7 +158,10 @@ class Review:
     def state(self) -> dict[str, object]:
         """As JSON; empty if nothing was missed."""
         return {
-            label: {one.key: [one.stage, one.due, *([one.robot] if one.robot else [])] for one in entries.values()}
+            label: {
+                one.key: [one.stage, one.due, *([one.robot, *one.before] if one.robot else [])]
+                for one in entries.values()
+            }
             for label, entries in self._lists.items()
             if entries
         }
@@ -156,9 +180,10 @@ class Review:
 
     def _read(self, key: str, entry: object) -> Missed | None:
         match entry:
-            case [int(stage), int(due), *rest] if _KEY.fullmatch(key) and len(rest) < 2:
-                robot = rest[0] if rest else ""
+            case [int(stage), int(due), *given] if _KEY.fullmatch(key) and len(given) <= 1 + MOST_ARMS:
+                arms = [arm for arm in given if isinstance(arm, str) and _ROBOT.fullmatch(arm)]
                 counts = type(stage) is int and type(due) is int and 0 <= stage < len(INTERVALS)
-                if counts and 0 <= due <= _LATEST and isinstance(robot, str) and _ROBOT.fullmatch(robot):
-                    return Missed(key, stage, min(due, self.today + INTERVALS[-1]), robot)
+                if counts and 0 <= due <= _LATEST and len(arms) == len(given):
+                    robot, *before = arms or [""]
+                    return Missed(key, stage, min(due, self.today + INTERVALS[-1]), robot, tuple(before))
         return None

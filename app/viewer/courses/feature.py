@@ -84,15 +84,19 @@ class CourseFeature(Feature):
 
     # In a room
 
-    def receive(self, packed: str) -> bool:
+    def receive(self, packed: str, exchanged: bool) -> bool:
         """Open a course that was sent, as JSON; returns whether it was not open already.
 
-        An empty text: the course of the room is over, and stays open.
+        Args:
+            packed: empty: the course of the room is over, and stays open.
+            exchanged: whether what it compares comes in the other order.
         """
         if not packed:
             self.stage.activity.sent = None
             return False
         course = self._progress.read(json.loads(packed))
+        if exchanged:
+            course = course.exchanged()
         self.stage.activity.sent = course
         self.stage.activity.stock()
         if course == self._progress.course:

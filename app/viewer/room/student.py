@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from app.classroom.clock import now
-from app.classroom.views import NewAttempt
+from app.classroom.views import NewAttempt, Recalled
 from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
@@ -187,7 +187,7 @@ class Student(Member):
         if course == self._course:
             return
         self._course = course
-        fresh = lessons.courses.receive(packed)
+        fresh = lessons.courses.receive(packed, self.room.exchanged)
         if not packed or (first and not fresh):
             return
         self.free()
@@ -222,12 +222,16 @@ class Student(Member):
             verdict=verdict.reason,
             score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0),
             started=now() - judged.seconds,
+            cause=verdict.cause,
         )
         if judged.sending:  # sent again after a lost connection, it is the same attempt
             name = f"{self.attendance.ticket.seat} {judged.exercise.id} {judged.seed} {judged.sending}"
             attempt = replace(attempt, id=hashlib.sha256(name.encode()).hexdigest()[:16])
         self._submissions.add(attempt)
         self.activity.say("Storing the answer …")
+
+    def tell_recalled(self, more: Recalled) -> None:
+        self.attendance.tell_recalled(more)
 
     def give_up(self, one: GivenUp) -> bool:
         if self.room.closed:

@@ -33,6 +33,7 @@ from app.classroom.hub import UNSTORED
 from app.classroom.standing import standing
 from app.classroom.tables import REVISION, Attempt, Base, Room, Seat
 from app.classroom.tokens import Tokens
+from app.classroom.views import Recalled
 from app.cli.parser import main
 
 ROOT = Path(__file__).parents[3]
@@ -201,6 +202,7 @@ STUDENTS = {
     "tell_task": ("swing",),
     "tell_gone": (True,),
     "tell_driven": ("SO-101",),
+    "tell_recalled": (Recalled(1, 1, 0, 0),),
     "submit": (attempt(),),
 }
 BOTH = {"room", "leave", "tell_page", "ticket", "changed"}

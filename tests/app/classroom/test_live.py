@@ -9,6 +9,7 @@ import pytest
 from app.classroom import Attendance, RefusedError, Ticket, live
 from app.classroom.live import AWAY, REMOVED, LiveRoom, Place
 from app.classroom.standing import standing
+from app.classroom.views import Recalled
 
 ROOM = {
     "id": "r",
@@ -25,6 +26,7 @@ SEAT = {
     "task": "",
     "gone": False,
     "driven": "",
+    "recalled": [],
     "voted": "",
     "vote": 0,
     "page": "",
@@ -177,6 +179,22 @@ def test_votes_are_counted_once_and_nobody_sees_whose(room):
     assert room.teacher.room.poll.votes == (0, 0), "votes belong to a question"
     room.teacher.remove_poll()
     assert room.ada.room.poll is None
+
+
+def test_every_second_student_gets_what_a_course_compares_in_the_other_order(room):
+    assert [page.room.exchanged for page in (room.ada, room.bob, room.cid)] == [False, True, False]
+    room.live.seats["ada"]["removed"] = True
+    assert [page.room.exchanged for page in (room.bob, room.cid)] == [True, False], "nobody changes sides"
+    assert not room.teacher.room.exchanged
+
+
+def test_counts_of_what_is_remembered_add_up_and_no_page_sees_them(room):
+    room.live.reports()
+    room.ada.tell_recalled(Recalled(1, 1, 0, 0))
+    room.ada.tell_recalled(Recalled(1, 0, 1, 1))
+    _, _, (row,) = room.live.reports()
+    assert (row["id"], row["recalled"]) == ("ada", [2, 1, 1, 1])
+    assert not any("recall" in name for seat in room.teacher.room.seats for name in vars(seat))
 
 
 def test_who_has_left_or_says_nothing_is_away_within_ten_seconds(room, clock):

@@ -9,12 +9,13 @@ from binascii import crc_hqx
 from dataclasses import replace
 from datetime import date, timedelta
 
+import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from app.classroom.results import ForgedCodeError, MistypedCodeError, Outcome, codes, read_code, write_code
-from app.classroom.results.mistakes import MOST, Reason, mistakes
+from app.classroom.results.items import MOST, Cause, Item, Reason, items
 from app.classroom.results.table import COLUMNS, Member, csv_of, rows
 from app.classroom.work import ANSWER_SHOWN, Attempt
 from kin import InputError
@@ -154,43 +155,125 @@ def test_who_needs_the_teacher_comes_first_and_everybody_has_a_row() -> None:
     assert (alone.exercise, alone.state) == ("", "no answer")
 
 
-def test_the_reasons_of_wrong_answers_are_counted_by_student() -> None:
-    def wrong(seat: str, words: str, at: float) -> Attempt:
-        return replace(attempt(seat, "a", 0.5, at), verdict=words)
+def wrong(seat: str, words: str, at: float = 1.0, cause: str = "", exercise: str = "a") -> Attempt:
+    return replace(attempt(seat, exercise, 0.5, at), verdict=words, cause=cause)
 
+
+def members_of(*seats: str) -> list[Member]:
+    return [Member(seat, seat.title(), number) for number, seat in enumerate(seats, 1)]
+
+
+def test_causes_are_counted_by_student() -> None:
     shown = replace(attempt("cy", "a", 0.0, 5.0), verdict=ANSWER_SHOWN)
-    members = [Member(name, name.title(), i) for i, name in enumerate(("cy", "di", "ed", "flo"), 1)]
-    attempts = [wrong("ed", "Too small.", 1.0), wrong("di", "Too large.", 2.0), wrong("di", "Too small.", 3.0)]
-    attempts += [
-        wrong("di", "Too small.", 4.0),
-        shown,
-        attempt("flo", "a", 1.0, 6.0),
-        attempt("gone", "a", 1.0, 7.0),
+    members = members_of("cy", "di", "ed", "flo")
+    attempts = [
+        *(wrong("ed", "Too small.", 1.0), wrong("di", "Too large.", 2.0), wrong("di", "Too small.", 3.0)),
+        *(wrong("di", "Too small.", 4.0), shown, attempt("flo", "a", 1.0, 6.0), attempt("gone", "a", 1.0, 7.0)),
     ]
-    (found,) = mistakes(members, [*attempts, attempt("flo", "b", 1.0, 8.0)])
-    assert (found.exercise, found.students, found.first) == ("a", 4, 1)
-    assert found.reasons == (Reason("Too small.", ("Di", "Ed")), Reason("Too large.", ("Di",)))
+    (found, other) = items(members, [*attempts, attempt("flo", "b", 1.0, 8.0)])
+    assert (found.exercise, found.students, found.first, found.looked) == ("a", 4, 1, 1)
+    assert found.causes == (
+        Cause("", (Reason("Too small.", ("Di", "Ed")),), 2),
+        Cause("", (Reason("Too large.", ("Di",)),), 1),
+    )
+    assert (other.exercise, other.first, other.causes) == ("b", 1, ()), (
+        "an exercise without mistakes is listed, too"
+    )
     many = [wrong("di", f"Reason {chr(97 + i)}.", float(i)) for i in range(2 * MOST)]
-    assert len(mistakes(members, many)[0].reasons) == MOST
+    assert len(items(members, many)[0].causes) == MOST
+
+
+def test_a_mistake_with_a_code_is_one_cause_however_it_is_worded() -> None:
+    one, two = "The other sign of joint 1.", "The other sign of joint 2."
+    given = [wrong("di", one, 1.0, "sign"), wrong("ed", two, 2.0, "sign"), wrong("di", two, 3.0, "sign")]
+    known = [wrong("ed", "The elbow is bent.", 4.0, "written"), wrong("di", "That is straight.", 5.0, "written")]
+    (found,) = items(members_of("di", "ed"), [*given, *known])
+    assert found.causes == (
+        Cause("sign", (Reason(two, ("Di", "Ed")), Reason(one, ("Di",))), 2),
+        Cause("", (Reason("The elbow is bent.", ("Ed",)),), 1),
+        Cause("", (Reason("That is straight.", ("Di",)),), 1),
+    )
 
 
 def test_reasons_that_differ_by_the_numbers_of_each_student_are_one() -> None:
-    members = [Member(seat, alias, number) for number, (seat, alias) in enumerate([("d", "Di"), ("e", "Ed")])]
     said = ("The sine, 0.5 m, was taken for the cosine.", "The sine, −1.5 m, was taken for the cosine.")
-    given = [replace(attempt(s, "a", 0.0, 1.0), verdict=words) for s, words in zip("de", said, strict=True)]
-    assert mistakes(members, given)[0].reasons == (Reason(said[0], ("Di", "Ed")),)
+    given = [wrong("di", said[0]), wrong("ed", said[1])]
+    assert items(members_of("di", "ed"), given)[0].causes[0].reasons == (Reason(said[0], ("Di", "Ed")),)
 
 
 def test_a_reason_has_the_numbers_of_its_own_exercise() -> None:
-    members = [Member("d", "Di", 1), Member("e", "Ed", 2)]
+    said = ("You get this with 0.5 m left out.", "You get this with 0.7 m left out.")
+    given = [wrong("di", said[0], exercise="y"), wrong("ed", said[1], exercise="z")]
+    assert [(one.exercise, one.causes[0].reasons[0].words) for one in items(members_of("di", "ed"), given)] == [
+        *(("y", said[0]), ("z", said[1]))
+    ]
+
+
+def test_exercises_are_in_the_order_of_the_course_and_times_are_those_of_first_answers() -> None:
     given = [
-        replace(attempt("d", "y", 0.0, 1.0), verdict="You get this with 0.5 m left out."),
-        replace(attempt("e", "z", 0.0, 2.0), verdict="You get this with 0.7 m left out."),
+        attempt("di", "z", 0.0, 10.0, started=8.0),
+        attempt("ed", "y", 1.0, 20.0, started=15.0),
+        attempt("ed", "z", 1.0, 30.0, started=20.0),
+        attempt("di", "z", 1.0, 90.0, started=10.0),
+        replace(attempt("flo", "z", 0.0, 99.0), verdict=ANSWER_SHOWN),
     ]
-    assert [(one.exercise, one.reasons[0].words) for one in mistakes(members, given)] == [
-        ("y", given[0].verdict),
-        ("z", given[1].verdict),
+    found = items(members_of("di", "ed", "flo"), given, order=("x", "y"))
+    assert [(one.exercise, one.seconds) for one in found] == [("y", 5.0), ("z", 6.0)]
+
+
+SEATS = [f"s{i}" for i in range(40)]
+
+
+def figures(right: dict[str, str]) -> dict[str, Item]:
+    """Of exercises that the first of `SEATS` have answered: 1 for right, 0 for wrong, - for not at all."""
+    given = [
+        attempt(seat, exercise, float(score), float(i))
+        for exercise, scores in right.items()
+        for i, (seat, score) in enumerate(zip(SEATS, scores, strict=False))
+        if score != "-"
     ]
+    return {one.exercise: one for one in items(members_of(*SEATS), given)}
+
+
+def test_the_discrimination_is_the_correlation_with_the_share_right_in_the_rest() -> None:
+    found = figures({"a": "11110000", "b": "11100001", "c": "111100--"})
+    r = found["a"].discrimination
+    x, rest = [1, 1, 1, 1, 0, 0, 0, 0], [1, 1, 1, 0.5, 0, 0, 0, 1]
+    assert r == pytest.approx(np.corrcoef(x, rest)[0, 1])
+    assert found["c"].discrimination is None, "six students are too few"
+    assert figures({"a": "11110000", "b": "11111111"})["a"].discrimination is None, "the rest is the same for all"
+    assert figures({"a": "11110000"})["a"].discrimination is None, "there is no rest"
+
+
+@pytest.mark.parametrize(
+    ("item", "rest", "words"),
+    [
+        ("1" * 19 + "0", "01" * 10, "Too easy"),
+        ("1" * 18 + "00", "1" * 10 + "0" * 10, ""),
+        ("1" * 4 + "0" * 16, "1" * 10 + "0" * 10, "Too hard"),
+        ("1" * 5 + "0" * 15, "1" * 10 + "0" * 10, ""),
+        ("1" * 7, "0101010", ""),
+        ("0011" * 10, "0101" * 10, "Does not discriminate"),
+        ("0011" * 5, "0101" * 5, ""),
+        ("0011" * 5, "1100" * 5, "Does not discriminate"),
+        ("0011" * 5, "0011" * 5, ""),
+    ],
+    ids=[
+        "easy",
+        "less easy",
+        "hard",
+        "less hard",
+        "seven students",
+        "chance",
+        "perhaps chance",
+        "opposite",
+        "alike",
+    ],
+)
+def test_items_that_tell_little_are_marked(item: str, rest: str, words: str) -> None:
+    found = figures({"a": item, "b": rest})["a"].remark
+    assert found.startswith(words)
+    assert bool(found) == bool(words)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +294,7 @@ def test_the_numbers_of_rows_joints_and_frames_are_no_students_own(one: str, oth
     given = [
         replace(attempt(s, "a", 0.0, 1.0), verdict=words) for s, words in zip("de", (one, other), strict=True)
     ]
-    assert len(mistakes(members, given)[0].reasons) == (1 if same else 2)
+    assert len(items(members, given)[0].causes) == (1 if same else 2)
 
 
 @given(st.text(max_size=12), st.text(max_size=12))
@@ -228,6 +311,12 @@ def test_no_cell_is_a_formula(alias: str, answer: str) -> None:
     for value in row:
         assert not value.lstrip(" ")[:1] or value.lstrip(" ")[0] not in "=+-@\t\r"
     assert row[0].replace("'", "") == alias.replace("'", "")
+
+
+def test_the_file_has_the_code_of_the_mistake() -> None:
+    given = [wrong("a", "The other sign.", cause="sign"), attempt("a", "a", 1.0, 2.0)]
+    found = list(csv.DictReader(io.StringIO("".join(csv_of([given], {})))))
+    assert [row["cause"] for row in found] == ["sign", ""]
 
 
 def test_the_file_tells_students_apart_and_has_the_state_of_the_list() -> None:

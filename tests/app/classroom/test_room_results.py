@@ -5,18 +5,23 @@ from __future__ import annotations
 import asyncio
 import csv
 import io
+import math
+import re
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY
 
 import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import insert
+from test_hub import until
 
 from app.classroom import COOKIE, ClassroomUnavailable, NewAttempt, Ticket, tables
 from app.classroom.results import store
 from app.classroom.rooms import OpenRoom, Rooms
+from app.classroom.views import Recalled
 from app.classroom.work import SHOWN_ANSWER, Attempt
 from app.service.main import create_app
 from app.service.web.rooms import results
@@ -68,6 +73,37 @@ def test_the_teacher_sees_who_is_stuck_first(school: Class) -> None:
     rows = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
     assert [row["alias"] for row in rows] == ["Ada", "'=<b>Eve", "'=<b>Eve", "'=<b>Eve"]
     assert "Results" in teacher.get("/room").text
+
+
+def test_the_teacher_sees_causes_figures_and_what_is_remembered(school: Class) -> None:
+    teacher, hub = school.browser(Ticket(school.room.id)), school.app.state.classroom
+    seats = [school.rooms.join(school.room.code, f"<b>{i}") for i in range(8)]
+    for i, seat in enumerate(seats):
+        for exercise, score in (("swing", float(i < 5)), ("two-elbows", float(i < 1))):
+            given = NewAttempt(exercise, 7, ["30"], "The other <sign>.", score, 0.0, cause="sign" * (score < 1.0))
+            school.rooms.submit(seat, given)
+    school.rooms.submit(seats[7], NewAttempt.given_up("two-elbows", 7, 0.0))
+    page = hub.attend(seats[0], lambda: None)
+    for right in (1, 0):
+        page.tell_recalled(Recalled(1, right, 0, 0))
+    until(lambda: store.recalled_of(hub.database, school.room.id) == (2, 1, 0, 0))
+    text = teacher.get("/room/results").text
+    table = text.split("<table data-mistakes>")[1].split("</table>")[0]
+    row = table.split("Both elbows")[1].split("</tbody>")[0]
+    assert "Too hard: 20 % or fewer are right at the first try." in row
+    assert re.findall(r'<td class="n"[^>]*>(.*?)</td>', row) == [
+        "1 of 8",
+        ANY,
+        f"{math.sqrt(3 / 35):.2f}",
+        "1 of 8",
+    ]
+    assert '<meter max="8" value="7"' in row
+    assert "<b>7</b> sign</summary>" in row
+    assert "The other &lt;sign&gt;.<br><bdi>&lt;b&gt;1, &lt;b&gt;2" in row
+    assert "seven days and more after the last answer: 1 of 2 right." in text
+    file = teacher.get("/room/results.csv").content.decode("utf-8-sig")
+    assert [one["cause"] for one in csv.DictReader(io.StringIO(file))][:3] == ["", "", ""]
+    assert file.count(",sign\r\n") == 3 + 7
 
 
 def test_the_page_reads_only_the_beginnings_of_answers(school: Class, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,7 +77,7 @@ class School:
         finally:
             other.state.classroom.close()
         assert (page.status_code, file.status_code) == (200, 200)
-        [row] = re.findall(r'<tr><th scope="row".*?</tr>', page.text)
+        [row] = re.findall(r'<tr><th scope="row" dir.*?</tr>', page.text)
         assert "<b>" not in row
         assert "<i>" not in row
         cells = [html.unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row)]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
+from app.classroom.views import Recalled
 from app.service.web.rooms.network import ANY, url_for_others
 from app.shared.clients import is_local_name
 from app.shared.security import guard_teacher
@@ -57,11 +58,11 @@ def results_page(request: Request, status: int = 200, **values: object) -> HTMLR
         "rows": (),
         "counts": {},
         "more": 0,
-        "attempts": 0,
         "problem": "",
         "pairs": (),
         "gains": (),
-        "mistakes": (),
+        "items": (),
+        "recalled": Recalled(),
     }
     guard_teacher(request.scope)
     text = _template("results.html").render(**{**known, **values, "root": "../"})

@@ -6,7 +6,7 @@ import codecs
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -17,10 +17,11 @@ from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub
 from app.classroom.clock import now
 from app.classroom.courses import Courses, SentExercises
-from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, pairs_of
-from app.classroom.results.mistakes import MOST as MOST_REASONS
-from app.classroom.results.mistakes import Mistakes, mistakes
+from app.classroom.results.gains import LEAST, Gain, Gains, Pair, csv_of_gains, exercises_of, gains, pairs_of
+from app.classroom.results.items import MOST as MOST_CAUSES
+from app.classroom.results.items import Item, items
 from app.classroom.results.table import Row, csv_of, rows
+from app.classroom.views import Recalled
 from app.classroom.work import Attempt
 from app.service.web.rooms.page import results_page
 from kin.units import fixed
@@ -35,6 +36,18 @@ MOST = 400  # rows on the screen; the file has all attempts
 CSV = "text/csv; charset=utf-8"
 
 
+class _Read(NamedTuple):
+    """What the database has of a class: the room, what it was sent, and what has become of that."""
+
+    room: OpenRoom
+    sent: Sent
+    table: list[Row]
+    pairs: list[Pair]
+    gains: list[Gains]
+    items: list[Item]
+    recalled: Recalled
+
+
 class Results:
     """The pages of the attempts of a room; only for its teacher."""
 
@@ -47,26 +60,28 @@ class Results:
         return results_page(request, 503, problem=why)
 
     async def show(self, request: Request) -> Response:
-        """The table; its script asks for this page again and again."""
-        token = request.cookies.get(COOKIE, "")
-        room, sent, table, attempts, compared, wrong = await run_in_threadpool(self._read, token)
-        shown = await run_in_threadpool(lambda: _rows(self._known(sent), table[:MOST]))
+        """The tables; their script asks for this page again and again."""
+        return await run_in_threadpool(self._show, request)  # pages of rooms move meanwhile
+
+    def _show(self, request: Request) -> Response:
+        read = self._read(request.cookies.get(COOKIE, ""))
+        sent, table, known = read.sent, read.table, self._known(read.sent)
+        shown = _rows(known, table[:MOST])
         states = ("stuck", "gave up", "not begun", "at it", "solved", "not here yet")
         counted = [row for row in table if not sent.task or row.exercise == sent.task]
         counts = {state: sum(row.state == state for row in counted) for state in states}
-        pairs, found = compared
-        titles = await run_in_threadpool(lambda: self._known(sent).titles) if pairs or wrong else {}
+        titles = known.titles if read.pairs or read.items else {}
         return results_page(
             request,
-            room=room,
+            room=read.room,
             rows=shown,
             counts=counts,
             more=len(table) - len(shown),
-            attempts=attempts,
-            pairs=[[titles.get(key, key) for key in pair] for pair in pairs],
-            gains=[_compared(row) for row in found[: MOST + 1]],
-            mistakes=[(titles.get(one.exercise, one.exercise), one) for one in wrong],
-            most_reasons=MOST_REASONS,
+            pairs=[[titles.get(key, key) for key in pair] for pair in read.pairs],
+            gains=[_compared(row) for row in read.gains[: MOST + 1]],
+            items=[(titles.get(one.exercise, one.exercise), _figures(one), one) for one in read.items],
+            recalled=read.recalled,
+            most_causes=MOST_CAUSES,
         )
 
     async def download(self, request: Request) -> Response:
@@ -83,27 +98,26 @@ class Results:
 
     async def download_gains(self, request: Request) -> Response:
         """A row for each pair of exercises and student, and for the class."""
-        room, _, _, _, (pairs, found), _ = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
-        text = csv_of_gains(found, pairs)
-        return Response(codecs.BOM_UTF8 + text.encode(), media_type=CSV, headers=_as_file("gains", room))
+        read = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+        text = csv_of_gains(read.gains, read.pairs)
+        return Response(codecs.BOM_UTF8 + text.encode(), media_type=CSV, headers=_as_file("gains", read.room))
 
-    def _read(
-        self, token: str
-    ) -> tuple[OpenRoom, Sent, list[Row], int, tuple[list[Pair], list[Gains]], list[Mistakes]]:
-        """The room of the teacher's cookie, what it was sent, its table, how many attempts, comparisons, mistakes.
+    def _read(self, token: str) -> _Read:
+        """The room of the teacher's cookie.
 
         Raises:
             ProblemError: 403.
         """
-        from app.classroom.results.store import attempts_of, members_of, sent_to  # SQLAlchemy
+        from app.classroom.results.store import attempts_of, members_of, recalled_of, sent_to  # SQLAlchemy
 
         room, database = self._room(token), self._hub.database
         attempts = attempts_of(database, room.id, answers=False)
         sent = sent_to(database, room.id)
         members, pairs = members_of(database, room.id), pairs_of(sent.course)
-        compared = pairs, gains(members, attempts, pairs) if pairs else []
         table = rows(members, attempts, sent.task, now())
-        return room, sent, table, len(attempts), compared, mistakes(members, attempts)
+        compared = gains(members, attempts, pairs) if pairs else []
+        asked = items(members, attempts, exercises_of(sent.course))
+        return _Read(room, sent, table, pairs, compared, asked, recalled_of(database, room.id))
 
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""
@@ -139,13 +153,28 @@ def _rows(known: SentExercises, table: Iterable[Row]) -> list[dict[str, object]]
                 "title": known.title(row.exercise),
                 "tries": work.tries,
                 "score": round(100 * work.score),
-                "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
+                "time": _clock(row.seconds),
                 "answer": known.said(row.exercise, work.seed, said) if work.tries else said,
                 "verdict": work.verdict,
                 "begun": bool(work.numbers),
             }
         )
     return found
+
+
+def _figures(one: Item) -> list[str]:
+    """The figures of an exercise as the page has them, in the order of its columns."""
+    r, seconds = one.discrimination, one.seconds
+    return [
+        f"{one.first} of {one.students}",
+        "" if seconds is None else _clock(seconds),
+        "" if r is None else fixed(r, 2),
+        f"{one.looked} of {one.students}",
+    ]
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02}"
 
 
 def _compared(row: Gains) -> dict[str, object]:
@@ -156,9 +185,22 @@ def _compared(row: Gains) -> dict[str, object]:
 
 def _in_words(one: Gain) -> dict[str, object]:
     scores = ["–" if value is None else f"{100 * value:.0f} %" for value in (one.before, one.after)]
-    both = one.before is not None and one.after is not None
-    gain = fixed(one.gain, 2) if one.gain is not None else "all right before" if both else ""
-    return {"before": scores[0], "after": scores[1], "gain": gain, "students": one.students}
+    said = []
+    if one.interval is not None and one.difference is not None:
+        low, high = (f"{100 * end:+.0f}" for end in one.interval)
+        said.append(f"{100 * one.difference:+.0f} points (95 %: {low} to {high})".replace("-", "−"))
+    if one.gain is not None:
+        said.append(f"g = {fixed(one.gain, 2)}")
+    elif one.difference is not None:
+        said.append("all right before")
+    fewer = "" if one.enough else f"; a gain is said from {LEAST} on"
+    return {
+        "before": scores[0],
+        "after": scores[1],
+        "said": said,
+        "students": f"{one.students} answered both{fewer}",
+        "exchanged": one.exchanged,
+    }
 
 
 class _Download(StreamingResponse):

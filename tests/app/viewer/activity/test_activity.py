@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.classroom.courses import Course, Courses, Item
+from app.classroom.views import Recalled
 from app.exercises import Exercise, Exercises, Verdict, parse_exercise
 from app.viewer.activity.activity import EXERCISES, Activity, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
@@ -31,6 +32,9 @@ class Room:
 
     def submit(self, judged: Judged) -> None:
         self.got.append(judged)
+
+    def tell_recalled(self, more: Recalled) -> None:
+        raise AssertionError("nothing is due")
 
     def give_up(self, one: GivenUp) -> bool:
         self.got.append(one)

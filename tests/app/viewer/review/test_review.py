@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.classroom.courses import Course, Courses, Item
+from app.classroom.views import Recalled
 from app.exercises import Exercise, Exercises, Verdict
 from app.exercises.lessons import LESSONS as KEYS
 from app.shared.store import Store
@@ -113,6 +115,45 @@ def test_a_question_counts_about_its_own_arm_alone(clock: Clock) -> None:
     )
 
 
+def test_what_is_remembered_after_a_week_and_about_a_new_arm_is_counted(clock: Clock) -> None:
+    review, key = Review(clock), question_key("velocity", "3")
+    assert review.recalled(key, True, "ur5") is None, "it was never missed"
+    review.take(key, False, "ur5")
+    assert review.recalled(key, True, "ur5") is None, "it is not due"
+    clock.pass_days(1)
+    assert review.recalled(key, True, "panda") is None, "it is asked about the other arm"
+    assert review.recalled(key, True, "ur5") == (0, 0, 0, 0), "a day later, about the same arm"
+    review.move(key, "panda")
+    assert review.recalled(key, True, "panda") == (0, 0, 1, 1)
+    review.take(key, True, "panda")
+    clock.pass_days(7)  # it was due after three
+    assert review.recalled(key, False, "panda") == (1, 0, 1, 0)
+    review.move(key, "ur5")
+    assert review.recalled(key, True, "ur5") == (1, 1, 0, 0), "this arm was the first one"
+    again = Review(clock)
+    again.restore(json.loads(json.dumps(review.state())))
+    assert again.missed == review.missed
+    for arm in "abcdefgh":
+        review.move(key, arm)
+    assert review.missed[key].before == ("g", "f", "e", "d"), "the last ones are kept"
+    review.take(key, False, "z")
+    assert review.missed[key].before == ("h", "g", "f", "e")
+
+
+def test_a_seat_counts_what_is_remembered(clock: Clock) -> None:
+    heard: list[Recalled] = []
+    one, missed = activity(), ALL.all[1]
+    one.review = Review(clock)
+    one.answer(missed, None, Verdict(False, "No."), 1.0)
+    seat = SimpleNamespace(submit=lambda judged: None, tell_recalled=heard.append)
+    one.take_seat(ExerciseContext("seat room me", b"key", seat=True), seat)
+    one.answer(missed, None, Verdict(False, "No."), 1.0)
+    clock.pass_days(8)
+    one.answer(missed, None, Verdict(True, "Yes."), 1.0)
+    one.answer(missed, None, Verdict(False, "No."), 1.0)
+    assert heard == [Recalled(1, 1, 0, 0)], "the first answer of the day counts"
+
+
 def test_a_long_list_keeps_what_is_known_least(clock: Clock) -> None:
     review = Review(clock)
     review.take("known-best", False)
@@ -167,7 +208,20 @@ def test_seats_have_lists_of_their_own(clock: Clock) -> None:
 @pytest.mark.parametrize(
     "entry",
     [
-        *(None, 5, "x", {}, [], [0], [0, 1, 2], [0, 1, "ur5", "ur5"], [3, 20_000], [-1, 20_000], [0, -1]),
+        *(
+            None,
+            5,
+            "x",
+            {},
+            [],
+            [0],
+            [0, 1, 2],
+            [0, 1, "ur5", *["ur5"] * 5],
+            [0, 1, "ur5", 5],
+            [3, 20_000],
+            [-1, 20_000],
+            [0, -1],
+        ),
         *([True, 20_000], [0, 1e400], [0, 20_000.0], [0, 10**30], [0, 20_000, "<b>"], [0, 20_000, "x" * 61]),
     ],
     ids=str,
@@ -221,6 +275,9 @@ def test_answers_of_exercises_and_shown_ones_are_collected() -> None:
 def test_the_list_of_a_seat_is_not_that_of_the_page() -> None:
     class Room:
         def submit(self, judged: object) -> None:
+            return None
+
+        def tell_recalled(self, more: Recalled) -> None:
             return None
 
         def give_up(self, one: GivenUp) -> bool:

@@ -18,6 +18,8 @@ from pydantic import SecretStr
 
 import kin
 from app.classroom import COOKIE, Attendance, Hub, Ticket
+from app.classroom.courses import Course, Item, to_data
+from app.exercises import Exercises
 from app.live import Line, Lines
 from app.shared.clouds import Clouds
 from app.shared.preparation import Preparation
@@ -459,6 +461,20 @@ def test_a_course_opens_on_every_page(room: Class) -> None:
     assert "New course" not in student.html
     press(teacher, "uncourse")
     teacher.wait(lambda: "data-class-course" not in teacher.html)
+
+
+def test_every_second_student_gets_what_a_course_compares_in_the_other_order(room: Class) -> None:
+    keys = "two-elbows", "swing", "other-wrist"
+    course = Course("Week 1", "", tuple(Item("exercise", key) for key in keys), before=keys[:1], after=keys[2:])
+    (ann, _), (bob, ticket) = room.join("Ann"), room.join("Bob")
+    teacher = room.hub.attend(Ticket(room.room.id), lambda: None)
+    teacher.send_course(json.dumps(to_data(course)))
+    teacher.leave()
+    titles = [Exercises().get(key).title for key in keys]  # type: ignore[union-attr]
+    for student, order in ((ann, titles), (bob, titles[::-1]), (room.student(ticket), titles[::-1])):
+        student.wait(lambda student=student: 'data-course="follow"' in student.html)
+        places = [student.html.index(f'kb-exercise-name">{title}<') for title in order]
+        assert places == sorted(places)
 
 
 def test_a_course_replaces_the_task_and_says_so(room: Class) -> None:
