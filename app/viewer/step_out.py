@@ -208,4 +208,4 @@ def left(found: Exits, shown: Exit, units: Units) -> Notice:
 
 def _card(words: str, *buttons: tuple[str, str, str], more: str = "") -> str:
     """Words, more for which a phone has no room, and buttons: what each sends, its text, its hint."""
-    return render("panel/step_out", words=words, more=more, buttons=buttons)
+    return render("panel/offer", feature="step-out", label="Step out", words=words, more=more, buttons=buttons)

@@ -73,7 +73,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     key = "connect"
     title = "Connected program"
     settings_of, facts_of = TapeSettings, Facts
-    messages = frozenset({"upload"})
+    messages = frozenset({"upload", "stop"})
     files = MappingProxyType({"upload": OPENED.size})
     undo: ClassVar[dict[str, str]] = {"on_show_arm": "Another arm"}
 
@@ -110,6 +110,8 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         match key:
             case ("arriving", "upload") if isinstance(value, IncomingFile):
                 self._opening.expect(value)
+            case ("stop", int()):
+                self.on_close()
             case ("upload",):
                 if isinstance(value, IncomingFile):
                     self._opening.take(value)
@@ -182,6 +184,10 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         self._opening.stop()
         self._tape.discard()
         self.stage.door.close("The page was closed.")
+
+    @property
+    def offer(self) -> str:
+        return views.stop(self.settings.program) if self.settings.program else ""
 
     # Declared
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from app.classroom.tokens import show_code
@@ -45,6 +47,20 @@ def state_of(program: Program | None) -> tuple[str, int, str]:
 def state(name: str, rate: int, delay: str) -> str:
     """Who is connected, in the words of the page."""
     return render("live/state", name=name, rate=rate, delay=delay)
+
+
+@lru_cache(maxsize=256)
+def stop(name: str) -> str:
+    """Who may move the arm, and the button that ends that, for the status card."""
+    button = "stop", "Stop", "Ends the connection: no program can move this page until you show a new code"
+    return render(
+        "panel/offer",
+        feature="connect",
+        label="Connected program",
+        words=f"{name} is connected.",
+        more="",
+        buttons=(button,),
+    )
 
 
 def opening(words: str) -> str:

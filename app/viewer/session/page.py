@@ -398,7 +398,7 @@ class VisitorPage(ShownArm, Worker):
                     if feature.due is not None:
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
                 self.status.fail(next((feature.failure for feature in self.features if feature.failure), ""))
-                self.status.offer(next((feature.offer for feature in self.features if feature.offer), ""))
+                self.status.offer("".join(feature.offer for feature in self.features))
             if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
                 self._save()  # in the same frame, so that nothing is on show that a reload would lose
             self.live.publish(self._result)

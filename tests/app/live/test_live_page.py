@@ -244,6 +244,13 @@ def test_a_measured_arm_is_a_ghost_with_a_difference_per_joint(page, program):
     page.wait(lambda: not ghosts() and "data-live-measured" not in page.html)
 
 
+def test_stop_in_the_status_card_ends_the_connection(page, program):
+    page.wait(lambda: "arm.py is connected." in page.html)
+    page.say("feature", ["connect", ["stop", 0], None])
+    assert program.until("end")["reason"] == "The page has withdrawn the code."
+    page.wait(lambda: 'data-guide-do="stop"' not in page.html)
+
+
 def test_a_withdrawn_code_ends_the_connection(page, program):
     program.do(measured=Q)
     press(page, "Withdraw the code")
