@@ -36,6 +36,7 @@ RUN cd /opt/kinboard/lib/python*/site-packages \
 COPY pyproject.toml README.md LICENSE ./
 COPY deploy/wheel deploy/wheel
 COPY static static
+COPY docs docs
 COPY kin kin
 COPY app app
 ARG VERSION

@@ -79,6 +79,10 @@ RULES: dict[str, set[str]] = {
     },
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/exercises": {"kin", "numpy", "app.exercises"},
+    "app/mcp": {
+        *("mcp", "fastapi", "pydantic_core", "starlette", "websockets", "kin"),
+        *("app.api", "app.live.client.connection", "app.mcp", "app.shared"),
+    },
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
     "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom", "kin.parsing"},
@@ -154,6 +158,9 @@ RULES: dict[str, set[str]] = {
         *("anyio", "starlette", "msgspec", "itsdangerous", "kin"),
         *("app.api.problems", "app.bench.board", "app.classroom", "app.service.web", "app.shared"),
     },
+    "app/service/web/agents.py": {
+        *("fastapi", "mcp", "starlette", "app.api.body", "app.mcp", "app.service.web.hosts", "app.shared"),
+    },
     "app/notebook": {
         *("kin", "numpy", "app.classroom.tokens", "app.live.client", "app.notebook"),
         "app.viewer.session.state",
@@ -194,7 +201,7 @@ RULES: dict[str, set[str]] = {
         "scservo_sdk",
         "serial",
     },
-    "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
+    "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.mcp", "app.service.main", "app.shared"},
     "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }
 

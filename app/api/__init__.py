@@ -8,7 +8,7 @@ request bodies in ``uploads``, the ``classroom``, and the ``lines`` of pages wit
 from starlette.routing import BaseRoute
 
 from app.api import equations, fk, ik, jacobian, motion, path, postures, singularity, way
-from app.api.arms import calibrate, compare, files, motors, robots
+from app.api.arms import calibrate, compare, files, motors, picture, robots
 from app.api.body import UploadMemory
 from app.api.classroom import results
 from app.api.document import complete_document
@@ -36,6 +36,7 @@ _MODULES = (
     compare,
     motors,
     calibrate,
+    picture,
     path,
     motion,
     way,

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 from app.cli import arguments as declare
+from app.cli.arguments.agents import add_mcp
 from app.cli.arguments.calibrate import add_calibrate
 from app.cli.arguments.postures import add_cuspidal, add_postures
 from app.cli.arguments.shared import Parents
@@ -193,6 +194,12 @@ def _load_open() -> Run:
     return run
 
 
+def _load_mcp() -> Run:
+    from app.cli.serve import run_mcp
+
+    return run_mcp
+
+
 def _load_fk() -> Run:
     from app.cli.fk import run
 
@@ -353,6 +360,7 @@ def _load_lti() -> Run:
 COMMANDS = (
     Command("serve", declare.add_serve, _load_serve),
     Command("open", declare.add_open, _load_open),
+    Command("mcp", add_mcp, _load_mcp),
     Command("fk", declare.add_fk, _load_fk, interpreted=True, compiled_with="configurations"),
     Command("ik", declare.add_ik, _load_ik),
     Command("move", declare.add_move, _load_move),

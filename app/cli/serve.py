@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import gc
 import os
 import sys
@@ -13,6 +15,7 @@ from pydantic import ValidationError
 
 from app.cli.startup import hidden, no_collections
 from app.shared.settings import OBSOLETE, Settings
+from app.shared.threads import end_process
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only")  # they override the environment
 
@@ -35,6 +38,24 @@ def run(arguments: Namespace) -> int:
         return run_service(settings, open_browser=arguments.open)
     finally:
         gc.unfreeze()
+
+
+def run_mcp(arguments: Namespace) -> int:
+    """Serve an agent over standard input and output until it leaves; 2: an invalid setting, or no extra."""
+    settings = read_settings({} if arguments.robots is None else {"robots": arguments.robots})
+    if settings is None:
+        return 2
+    try:
+        from app.mcp.server import serve_stdio
+    except ImportError:
+        print("kinboard: this needs an extra: pip install 'kinboard[mcp]'", file=sys.stderr)
+        return 2
+    with no_collections(), hidden("scipy"):
+        from app.service.main import create_app
+    token = None if settings.token is None else settings.token.get_secret_value()
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(serve_stdio(create_app(settings.on_this_machine()), arguments.url, token))
+    return end_process(0)  # threads may still compute
 
 
 def read_settings(given: Mapping[str, Any]) -> Settings | None:

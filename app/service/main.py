@@ -12,8 +12,9 @@ import signal
 import socket
 import sys
 from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext
 from functools import cache, partial
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI
@@ -65,6 +66,7 @@ from app.shared.threads import end_process
 from kin import InputError, RobotFileError, __version__
 
 if TYPE_CHECKING:
+    from app.service.web.agents import Agents
     from app.viewer.server import ViewerServer
 
 # Seconds that a thread may keep the interpreter while others wait. The event loop gives it away with each read and
@@ -127,7 +129,7 @@ def create_app(
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         startup.start()
         (keeper := MemoryKeeper(idle)).start()
-        async with sweeping(classroom):
+        async with sweeping(classroom), agents.running() if agents else nullcontext():
             yield
         keeper.stop()
         work.close()  # computations still running have had their time to finish
@@ -146,6 +148,7 @@ def create_app(
     app.router.routes.extend(room_routes(classroom, settings, known, state.tries))
     app.router.routes.extend(lti_routes(classroom, settings, known))
     app.include_router(status.router)
+    state.agents = agents = _agents(app, settings) if settings.mcp else None
     _add_middleware(app, settings, Guests(classroom))
     return app
 
@@ -155,6 +158,20 @@ def _viewer(*arguments: Any) -> ViewerServer:
     from app.viewer.server import ViewerServer
 
     return ViewerServer(*arguments)
+
+
+def _agents(app: FastAPI, settings: Settings) -> Agents:
+    # The SDK takes a second to import, and is an extra.
+    from app.service.web.agents import Agents
+
+    return Agents(app, settings)
+
+
+def _check_extras(settings: Settings) -> None:
+    """Raises `InputError` or `PlatformsRefused` if a setting needs what is not installed or invalid."""
+    if settings.mcp and find_spec("mcp") is None:
+        raise InputError("KINBOARD_MCP", True, "the extra mcp installed: pip install 'kinboard[mcp]'")
+    check_platforms(settings)
 
 
 def _courses(settings: Settings, store: Store) -> Courses:
@@ -221,7 +238,7 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
             store = Store(settings.robots)
             courses = _courses(settings, store)
             _ = courses.all  # now: a service that is started again must not depend on the files
-            check_platforms(settings)
+            _check_extras(settings)
         except (InputError, RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1

@@ -162,6 +162,11 @@ class Settings(BaseSettings):
     )
     max_visitors: int = Field(200, ge=1, description="Maximum number of open viewer tabs.")
     access_log: bool = Field(False, description="Log each request to stderr, one JSON object per line.")
+    mcp: bool = Field(
+        False,
+        description="Whether agents may use the tools at /mcp (Model Context Protocol); needs the extra "
+        "kinboard[mcp].",
+    )
     cloud_memory: int = Field(
         512 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of workspace clouds."
     )
@@ -229,3 +234,10 @@ def static_folder() -> Path:
     package = Path(__file__).parents[1]
     installed = package / "_static"
     return installed if installed.is_dir() else package.parent / "static"
+
+
+def docs_folder() -> Path:
+    """The folder of the documentation: next to the package in a checkout, its pages inside it when installed."""
+    package = Path(__file__).parents[1]
+    installed = package / "_docs"
+    return installed if installed.is_dir() else package.parent / "docs"

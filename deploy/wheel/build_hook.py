@@ -1,7 +1,7 @@
 """Hatchling's build hook: the service is installed as ``kinboard``.
 
-A wheel gets the renamed package and the static files. An editable installation uses the checkout, where the
-package is called ``app``; there ``kinboard`` is another name of it.
+A wheel gets the renamed package, the static files and the pages of the documentation. An editable installation
+uses the checkout, where the package is called ``app``; there ``kinboard`` is another name of it.
 
 With KINBOARD_KERNELS=c a wheel also gets the kernels as an extension, compiled for this machine, or for what
 KINBOARD_TARGET names: a system and its levels of processors, as `kin.codegen.extension.build` calls them.
@@ -62,6 +62,8 @@ class WheelHook(BuildHookInterface):
             write_renamed(root / SOURCE, package)
             build_data["force_include"][str(package)] = INSTALLED
             build_data["force_include"][str(root / "static")] = f"{INSTALLED}/_static"
+            for page in (root / "docs").glob("*.md"):  # agents read them
+                build_data["force_include"][str(page)] = f"{INSTALLED}/_docs/{page.name}"
             if os.environ.get("KINBOARD_KERNELS") == "c":
                 self._add_kernels(root, build_data)
 

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
 from app.shared.answers.answer import Answer
-from app.shared.answers.robots import RobotAnswer, robot_answer
+from app.shared.answers.robots import BriefRobotAnswer, RobotAnswer, brief_answer, robot_answer
 from app.shared.finding import FIELDS, LONGEST, find_robots
 from kin import Robot
 
@@ -28,6 +28,8 @@ Find = Annotated[
     ),
 ]
 
+Brief = Annotated[bool, Query(description="Only the id, name, maker, number of joints and solver of each.")]
+
 
 class RobotList(Answer):
     """The robots this service offers."""
@@ -36,16 +38,26 @@ class RobotList(Answer):
     """In the order they are offered."""
 
 
-@router.get("/robots", summary="List the robots", response_model=RobotList, responses=refusals(422, 500))
-async def list_robots(request: Request, find: Find = "") -> Response:
+class BriefRobotList(Answer):
+    """The same in short."""
+
+    robots: list[BriefRobotAnswer]
+    """In the order they are offered."""
+
+
+@router.get(
+    "/robots", summary="List the robots", response_model=RobotList | BriefRobotList, responses=refusals(422, 500)
+)
+async def list_robots(request: Request, find: Find = "", brief: Brief = False) -> Response:
     """Every arm with its DH table, joints and limits. Its `id` goes into the other addresses."""
     # On a machine where no kernels are compiled yet, the solvers of general arms take seconds to be chosen.
-    found = await run_in_threadpool(_answers, store_of(request).robots, find)
+    found = await run_in_threadpool(_answers, store_of(request).robots, find, brief)
     return reply({"robots": found})
 
 
-def _answers(robots: Iterable[Robot], query: str) -> list[RobotAnswer]:
-    return [robot_answer(robot) for robot in find_robots(robots, query)]
+def _answers(robots: Iterable[Robot], query: str, brief: bool) -> list[RobotAnswer] | list[BriefRobotAnswer]:
+    found = find_robots(robots, query)
+    return [brief_answer(robot) for robot in found] if brief else [robot_answer(robot) for robot in found]
 
 
 @router.get(

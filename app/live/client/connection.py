@@ -76,7 +76,7 @@ class Connection:
         again: Callable[[], list[Message]],
         sent: Callable[[Message], None],
     ) -> None:
-        self._uri, self._options = _where(address, code, name, token)
+        self._uri, self._options = where(address, code, name, token)
         self._heard, self._again, self._sent = heard, again, sent
         self._lock = threading.Condition()
         self._outbox: list[Message] = []
@@ -302,7 +302,7 @@ def retry_after(tries: int) -> float:
     return 0.0 if tries <= 0 else min(RETRY * 2.0 ** min(tries - 1, 30), LONGEST_RETRY)
 
 
-def _where(address: str, code: str, name: str, token: str | None) -> tuple[str, dict[str, Any]]:
+def where(address: str, code: str, name: str, token: str | None) -> tuple[str, dict[str, Any]]:
     """The address of the websocket, and the options of the connection."""
     parts = urlsplit(address if "://" in address else f"http://{address}")
     if parts.scheme not in ("http", "https") or not parts.hostname:

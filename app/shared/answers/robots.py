@@ -142,6 +142,26 @@ class RobotAnswer(Answer):
     """Pose of the tool frame, which targets are about, in the frame after the last row: constant, 4×4, metres."""
 
 
+class BriefRobotAnswer(Answer):
+    """What an arm is called, and its kind."""
+
+    id: str
+    """Short name, used in URLs."""
+    name: str
+    """Display name."""
+    maker: str
+    """Who builds or built the arm; empty for an arm of textbooks."""
+    n: int
+    """Number of moving joints, the length of q."""
+    solver: str
+    """The family of closed forms that solves its inverse kinematics, or numeric."""
+
+
+def brief_answer(robot: Robot) -> BriefRobotAnswer:
+    """What an arm is called, and its kind."""
+    return BriefRobotAnswer.of(robot, solver=solver_names(robot).solver)
+
+
 def robot_answer(robot: Robot) -> RobotAnswer:
     """Everything that defines an arm."""
     names = solver_names(robot)

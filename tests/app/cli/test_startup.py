@@ -28,7 +28,15 @@ def test_a_package_that_has_been_imported_stays() -> None:
 def test_a_service_moves_its_first_arm_without_what_it_does_not_need() -> None:
     """These imports would take a third of the time until a service is ready."""
     warm_up_first()  # what is not in the cache yet is compiled here
-    unneeded = {"scipy", "trimesh", "cffi", "numba.np.arraymath", "numba.cpython.unicode", "numba.typed.typedlist"}
+    unneeded = {
+        "scipy",
+        "trimesh",
+        "cffi",
+        "numba.np.arraymath",
+        "numba.cpython.unicode",
+        "numba.typed.typedlist",
+        "mcp",
+    }
     program = (
         "import sys; from app.cli.serve import import_service; import_service()\n"
         "import app.viewer.server; from kin.warmup import warm_up_first; warm_up_first()\n"
