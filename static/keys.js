@@ -9,6 +9,7 @@
   const KEYS = [
     ["Anywhere", [
       ["Ctrl+Z; Ctrl+Shift+Z or Ctrl+Y", "undo; redo"],
+      ["Ctrl+K", "find a tab, lesson, exercise, arm or action by typing"],
       ["?", "this overview"],
     ]],
     ["A joint's slider", [

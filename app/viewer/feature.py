@@ -273,6 +273,10 @@ class Feature:
         """What can be done about where the arm is, as HTML for the status card; "" if there is nothing."""
         return ""
 
+    def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
+        """What the command palette offers of it: words, and key and value of the message of the button."""
+        return ()
+
     def extents(self) -> Sequence[Sphere]:
         """Spheres around what it shows in the scene. *Fit* includes them in the picture with the arm."""
         return ()

@@ -282,3 +282,23 @@ def test_the_overview_of_keys_is_dark_on_a_dark_page(tab: Tab) -> None:
         assert (back < 60, ink > 180) == (dark, dark)
         assert (back > 230, ink < 60) == (not dark, not dark)
         tab.page.keyboard.press("Escape")
+
+
+@pytest.mark.full
+def test_tabs_arms_and_lessons_are_found_by_typing(tab: Tab) -> None:
+    """The palette, without a mouse."""
+    tab.open("Move")
+    for words, row in (("ur10e", "Arm: UR10e"), ("workspace", "Workspace"), ("lesson veloc", "Lesson: Velocity")):
+        tab.page.keyboard.press("Control+k")
+        expect(tab.page.get_by_placeholder("Search commands...")).to_be_focused()
+        tab.page.keyboard.type(words)
+        expect(
+            tab.page.locator("[data-action][data-selected]").or_(tab.page.locator("[data-action]").first)
+        ).to_contain_text(row)
+        if words == "ur10e":
+            tab.screenshot("palette")
+        tab.page.keyboard.press("Enter")
+        expect(tab.page.get_by_placeholder("Search commands...")).to_have_count(0)
+    expect(tab.row("Robot").locator("input").first).to_have_value("UR10e")
+    expect(tab.page.get_by_role("tab", name="Learn")).to_have_attribute("aria-selected", "true")
+    expect(tab.row("Lesson").locator("input").first).to_have_value("Velocity")

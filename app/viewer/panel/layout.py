@@ -23,7 +23,7 @@ from kin.units import Units
 
 PANEL_WIDTH = 344  # pixels; visitors change it at the panel's edge
 SMALL_WIDTH = 280  # of a small one
-LEARN = "Learn"  # title of the tab for lessons
+MOVE, LEARN, VIEW = "Move", "Learn", "View"  # titles of tabs
 
 
 class Panel:
@@ -67,7 +67,7 @@ class Panel:
         self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
         group = gui.add_tab_group()
-        with group.add_tab("Move"):
+        with group.add_tab(MOVE):
             self.joints = gui.add_folder("Joints")
             self.gripper = GripperSlider(gui, self.joints, post)
             go_to_buttons(gui, post)
@@ -84,7 +84,7 @@ class Panel:
             if title == "Robot":
                 with tab:
                     self.robots.add_field(gui, post)
-        with group.add_tab("View"):
+        with group.add_tab(VIEW):
             self.view = gui.add_folder(None)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)

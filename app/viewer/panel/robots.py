@@ -41,6 +41,11 @@ class RobotMenu:
         self._field = gui.add_text("Find an arm", "", hint=FIND_HINT)
         listen(self._field, post, "find")
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The robots that can be chosen."""
+        return tuple(self._options)
+
     def hide(self) -> None:
         """Offer no other robot."""
         self._menu.visible = False

@@ -51,6 +51,7 @@ from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.live import LiveInput
 from app.viewer.session.looks import Looks
 from app.viewer.session.numbers import Numbers
+from app.viewer.session.palette import commands, offer
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
 from app.viewer.session.preparing import Preparing
@@ -505,6 +506,9 @@ class VisitorPage(ShownArm, Worker):
             self.channel.show("start", [self._persistence.begin(self.panel.share), LEARN if learns else ""])
             self.channel.show("history", ["", ""])
             self.channel.show("driven", self.driven)
+            if not (self._looking or self._persistence.embedded):
+                names, exercises = self.panel.robots.names, self.activity.exercises.all
+                offer(gui, commands(self.offered, self.features, names, exercises), self.post, self.channel)
         self.client.flush()
 
     def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:

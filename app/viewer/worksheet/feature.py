@@ -6,7 +6,7 @@ the panel, so the service keeps nothing, and it works for an arm of the visitor'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 
 import viser
 
@@ -72,6 +72,11 @@ class Worksheets(Feature):
                 self.stage.client.send_file_download(file, write(sheet).encode(), save_immediately=True)
             case _:
                 raise InputError("worksheet", key, "one of page, web, " + ", ".join(FILES))
+
+    def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
+        return [
+            (f"Save the worksheet as {suffix.upper()}", (kind, 0), None) for kind, (suffix, _) in FILES.items()
+        ]
 
     @property
     def _withheld(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -540,6 +540,12 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
             self._stop()
             self.change(time=time)
         self.stage.move_to(f.robot.clip(q), Notice("hand", views.title(index, f.segments[index])))
+
+    def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
+        yield from ((ACTS[name], (name,), None) for name in ("record", "pause", "clear"))
+        yield "Play or stop the program", ("play",), None
+        yield "Save the program", ("download",), None
+        yield from ((f"Save the motion as {title}", ("save",), name) for name, title in views.MOTIONS.items())
 
     # Files
 

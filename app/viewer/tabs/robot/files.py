@@ -144,12 +144,16 @@ def is_mjcf(text: str) -> bool:
     return is_urdf(text) and bool(_MJCF.match(text))
 
 
+KINDS = {
+    "toml": ("a robot file", ".toml", kin.robot_to_toml),
+    "urdf": ("URDF", ".urdf", kin.robot_to_urdf),
+    "mjcf": ("MJCF", ".xml", kin.robot_to_mjcf),
+}
+
+
 def text_of(robot: Robot, kind: object) -> tuple[str, str]:
-    """Name and text of a file of this kind, ``"toml"``, ``"urdf"`` or ``"mjcf"``; raises `kin.KinematicsError`."""
-    if kind == "toml":
-        return f"{robot.id}.toml", kin.robot_to_toml(robot)
-    if kind == "urdf":
-        return f"{robot.id}.urdf", kin.robot_to_urdf(robot)
-    if kind == "mjcf":
-        return f"{robot.id}.xml", kin.robot_to_mjcf(robot)
-    raise InputError("download", kind, "toml, urdf or mjcf")
+    """Name and text of a file of one of `KINDS`; raises `kin.KinematicsError`."""
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError("download", kind, "one of " + ", ".join(KINDS))
+    _, suffix, text = KINDS[kind]
+    return robot.id + suffix, text(robot)

@@ -7,7 +7,7 @@ not sent again; the rest is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from types import MappingProxyType
 
 import kin
@@ -25,7 +25,7 @@ from app.viewer.tabs.robot import edits, views, workpieces
 from app.viewer.tabs.robot.beginnings import Beginnings
 from app.viewer.tabs.robot.compare.comparing import Comparing
 from app.viewer.tabs.robot.edits import Cell, EditError
-from app.viewer.tabs.robot.files import MOST, text_of
+from app.viewer.tabs.robot.files import KINDS, MOST, text_of
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.tabs.robot.uploads import Uploads
 from kin import InputError, KinematicsError, RobotFileError
@@ -388,6 +388,9 @@ class RobotTab(Feature):
     def _reset(self) -> None:
         if words := self._beginnings.reset():
             self._refuse("There is nothing to reset to", words)
+
+    def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
+        return [(f"Save the arm as {about}", ("download",), kind) for kind, (about, *_) in KINDS.items()]
 
     # Files
 
