@@ -237,7 +237,7 @@ def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is
 ) -> None:
     page, dialog = tab.page, tab.page.get_by_role("dialog", name="Keys")
     rows = documented()
-    assert len(rows) == 21
+    assert len(rows) == 22
     page.evaluate("document.activeElement.blur()")
     page.keyboard.press("?")
     expect(dialog).to_be_visible()
