@@ -71,7 +71,7 @@ def arm_picture(robot: Robot, q: Array, side: Side = "corner", size: int = 480) 
         _capsule(
             draw,
             place(ends[i, j]),
-            radii[j] * scale,
+            float(radii[j]) * scale,
             _mixed(colour[:3], WHITE, 0.0 if i == last else 0.7),
         )
     if len(q) > 1:
