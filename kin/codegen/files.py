@@ -17,7 +17,7 @@ from kin.codegen import c, entries, js
 from kin.codegen.arm import Arm, arm_of
 from kin.codegen.vectors import c_test
 from kin.errors import InputError
-from kin.kernels.cache import fingerprint
+from kin.kernels.sources import fingerprint
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array
