@@ -231,11 +231,14 @@ def _scaled(P: Array, scale: float) -> Array:
 def spread(root: Array, freedom: float, poses: int, draws: int = 400) -> tuple[float, float]:
     """Expected error of the tip and what 95 % stay below, metres.
 
+    The sums of squares are drawn by their eigenvalues, which do not depend on the root or on rounding.
+
     Args:
         root: ``(3t, r)`` of which root rootᵀ is the covariance of the tip at the poses.
         freedom: degrees of freedom with which the noise is known.
     """
     rng = np.random.default_rng(0)
     t = np.sqrt(freedom / rng.chisquare(freedom, draws))
-    errors = np.sqrt(((root @ rng.normal(size=(root.shape[1], draws))) ** 2).sum(axis=0) / poses) * t
+    strengths = np.maximum(np.linalg.eigvalsh(root.T @ root), 0.0)
+    errors = np.sqrt(strengths @ rng.normal(size=(len(strengths), draws)) ** 2 / poses) * t
     return float(np.sqrt((root**2).sum() / poses)), _MARGIN * float(np.quantile(errors, 0.95))

@@ -9,7 +9,7 @@ import kin
 from kin.calibration import expected_error
 from kin.calibration.chain import Chain
 from kin.calibration.faults import checked
-from kin.calibration.fit import Touches, fit
+from kin.calibration.fit import Touches, fit, spread
 from kin.calibration.fixtures import PLANE, Places, TouchBoard, TouchFixture
 from kin.calibration.model import Model, TableTolerances, TouchNoise
 from kin.calibration.postures import Scene, candidates
@@ -407,3 +407,12 @@ def test_sizes_whose_squares_are_lost_in_rounding_are_refused(make, field, valid
         make()
     assert caught.value.field == field
     assert valid in str(caught.value)
+
+
+def test_the_expected_error_depends_on_the_covariance_and_not_on_the_root_that_a_library_finds():
+    rng = np.random.default_rng(4)
+    root, turned = rng.normal(size=(60, 12)), np.linalg.qr(rng.normal(size=(12, 12)))[0]
+    assert spread(root @ turned, 30.0, 20) == pytest.approx(spread(root, 30.0, 20), rel=1e-9)
+    _, bound = spread(root, 1e9, 20, draws=20_000)  # with noise that is known exactly
+    errors = np.sqrt(((root @ rng.normal(size=(12, 20_000))) ** 2).sum(axis=0) / 20)
+    assert bound == pytest.approx(1.12 * np.quantile(errors, 0.95), rel=0.01)
