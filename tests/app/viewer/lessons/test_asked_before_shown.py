@@ -93,10 +93,10 @@ def seen(tab: FakeBrowser, outline: Outline, before: set[str]) -> Iterator[tuple
         at = len(outline.steps) if key.startswith("c") else int(key) - 1
         start = len(tab.log)
         press(tab, "go", value=at)
-        tab.settle(0.1)
+        tab.settle()
         press(tab, "fields", key, value=[["98765.4"]])
         tab.wait(lambda key=key: "98765.4" in tab.html and "Not quite" in tab.html)  # type: ignore[misc]
-        tab.settle(0.1)
+        tab.settle()
         own = [m for u, m in tab.gui.items() if u not in before or "kb-readout" in str(m["props"].get("content"))]
         sent = [m.get("updates") or m.get("props") or {} for m in tab.log[start:] if m.get("uuid") not in before]
         words = [texts(m["props"]) for m in [*own, *tab.nodes.values()]] + [texts(props) for props in sent]
@@ -158,7 +158,7 @@ def test_what_a_lesson_draws_and_lists_comes_with_the_answer(server: int, key: s
             tab.choose("PUMA 560")
         tab.set("Lesson", title)
         tab.wait(lambda: "data-asked" in tab.html)
-        tab.settle(0.3)
+        tab.settle()
         assert shown(tab) == [False, False, False]
         press(tab, "reveal", "1")
         tab.wait(lambda: all(shown(tab)))
