@@ -69,7 +69,6 @@ class Prototype:
         result: the type that Python is returned.
         blocks: how many blocks the caller has, 0 if no array is returned.
         brief: whether it takes so little time that it keeps the GIL.
-        declaration: the function as C declares it.
     """
 
     entry: Entry
@@ -79,7 +78,6 @@ class Prototype:
     result: Type
     blocks: int
     brief: bool
-    declaration: str
 
 
 def units() -> dict[str, list[str]]:
@@ -160,12 +158,8 @@ def _prototype(entry: Entry, made: Instance, name: str, rooms: Rooms) -> Prototy
     )
     results = tuple(_values(made.result, (), frozenset()))
     blocks = 0 if room_of(made) is None else rooms.of_result(made)
-    parameters = [text for k, value in enumerate(arguments) for text in _parameters(value.kind, f"a{k}", "")]
-    parameters += [text for k, value in enumerate(results) for text in _parameters(value.kind, f"r{k}", "*")]
-    parameters += ["block *room"] if blocks else []
     keeps = brief.__name__ in decorators(made.function)
-    declaration = f"void {name}({', '.join(parameters) or 'void'})"
-    return Prototype(entry, name, arguments, results, made.result, blocks, keeps, declaration)
+    return Prototype(entry, name, arguments, results, made.result, blocks, keeps)
 
 
 def _parameters(kind: Scalar | ArrayOf, name: str, by: str) -> list[str]:
@@ -176,14 +170,16 @@ def _parameters(kind: Scalar | ArrayOf, name: str, by: str) -> list[str]:
 
 def _function(prototype: Prototype, made: Instance) -> str:
     """The function of an entry, which makes structs of its arguments, and the reverse."""
+    parameters = [p for k, value in enumerate(prototype.arguments) for p in _parameters(value.kind, f"a{k}", "")]
+    parameters += [p for k, value in enumerate(prototype.results) for p in _parameters(value.kind, f"r{k}", "*")]
+    parameters += ["block *room"] * (prototype.blocks > 0)
     names = (f"a{k}" for k in range(len(prototype.arguments)))
-    passed = [_struct(kind, names) for kind in made.kinds]
-    call = f"{made.name}({', '.join(['room'] * (prototype.blocks > 0) + passed)})"
-    if made.result == NONE:
-        return f"{prototype.declaration} {{ {call}; }}"
-    names = (f"r{k}" for k in range(len(prototype.results)))
-    puts = " ".join(_puts(made.result, "x", names))
-    return f"{prototype.declaration} {{ {c.name_of(made.result)} x = {call}; {puts} }}"
+    passed = ["room"] * (prototype.blocks > 0) + [_struct(kind, names) for kind in made.kinds]
+    body = f"{made.name}({', '.join(passed)});"
+    if made.result != NONE:
+        names = (f"r{k}" for k in range(len(prototype.results)))
+        body = f"{c.name_of(made.result)} x = {body} {' '.join(_puts(made.result, 'x', names))}"
+    return f"void {prototype.name}({', '.join(parameters) or 'void'}) {{ {body} }}"
 
 
 def _struct(kind: Type, names: Iterator[str]) -> str:
