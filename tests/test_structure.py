@@ -325,7 +325,7 @@ PRIVATE = 223  # uses of others' private names in tests
 IMPORTANT = 93  # in style sheets: most override what viser or Mantine writes into the style of an element
 # Private fields that features change, by class; none of all others.
 FIELDS = {
-    "Capability": 2,
+    "Capability": 1,
     "CourseFeature": 2,
     "Guide": 7,
     "Member": 6,

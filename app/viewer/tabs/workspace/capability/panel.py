@@ -90,7 +90,6 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     ) -> None:
         self._window, self._appears = window, appears
         self._voxels: Voxels | None = None
-        self._painted = 0.0
         super().__init__(stage, tab)
 
     def panel(self) -> Sequence[Node]:
@@ -166,8 +165,8 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         finally:
             found, look = self.facts.found, self.settings.look
             if found is not None and not self._is_drawn(found, look):
-                if now - self._painted >= REDRAW and self._window.is_open(moving):
-                    self._painted = now
+                rested = self._voxels is None or now - self._voxels.since >= REDRAW
+                if rested and self._window.is_open(moving):
                     self._draw_map(found, look)
                 else:
                     self.due = min(POLL, POLL if self.due is None else self.due)
