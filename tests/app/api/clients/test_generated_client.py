@@ -23,7 +23,7 @@ MODULES = Path(sys.prefix) / "lint" / "node_modules"  # where scripts/lint.sh in
 # What a call needs besides the arm and the body.
 ASKED = {"code": "AAAA", "n": 10}
 # Formats that are no JSON: the generator leaves their answers out and says so.
-UNREAD = "Unsupported content_type application/toml, application/xml"
+UNREAD = ("Unsupported content_type application/toml, application/xml", "Unsupported content_type image/png")
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,8 @@ def example_of(operation):
 
 
 def test_nothing_in_the_document_is_beyond_the_generator(made):
-    warnings = [part for part in made[1].split("WARNING")[1:] if UNREAD not in part]
+    parts = made[1].split("WARNING")[1:]
+    warnings = [part for part in parts if not any(unread in part for unread in UNREAD)]
     assert warnings == []
     assert "Unable to" not in made[1]
 
