@@ -59,8 +59,16 @@ class Arm:
         return len(self.form.branches)
 
     def buffer(self, *entries: str) -> int:
-        """How many doubles of the caller's buffer these entries take, all if none is named."""
-        return max(self.rooms.buffer.get(self.entries[each], 0) for each in entries or self.entries)
+        """How many doubles of the caller's buffer these entries take, all if none is named; 0 without one."""
+        sizes = {each: self.rooms.buffer.get(self.entries[each], 0) for each in entries or self.entries}
+        if sizes.get("solve"):
+            sizes["solve"] += self.answers
+        return max(sizes.values())
+
+    @property
+    def answers(self) -> int:
+        """How many doubles the configurations of a pose take, with their statistics."""
+        return self.rows * (self.robot.n + 5)
 
 
 def arm_of(robot: Robot, closest: bool = True) -> Arm:

@@ -92,6 +92,7 @@ def c_file(arm: Arm, name: str) -> str:
         values[f"{each}_scratch"] = f", {name}_scratch *scratch" if needed else ""
         values[f"{each}_memory"] = "scratch->numbers, " if needed else ""
         values[f"{each}_passed"] = ", scratch" if needed else ""
+    values["answer_memory"] = f"scratch->numbers + {arm.answers}, " if arm.buffer("solve") else ""
     return _file(arm, name, "c", values)
 
 
@@ -147,8 +148,7 @@ def _sections(arm: Arm) -> set[str]:
     found = {"intervals", "nearest"} & set(arm.entries)
     if arm.buffer():
         found.add("buffer")
-    if arm.buffer("solve"):
-        found.add("ik_buffer")
+    found.add("ik_buffer" if arm.buffer("solve") else "ik_stack")
     if arm.robot.n < 6:
         found.add("few")
     if arm.parameter is None:
