@@ -27,6 +27,7 @@ const viserPage = (() => {
     progress: '[role="progressbar"]',
     menu: "input.mantine-Select-input", // whose options are searched by typing
     settings: "button .tabler-icon-adjustments", // viser's own settings
+    commands: "button .tabler-icon-list-search",
     icon: "svg.tabler-icon, svg[data-combobox-chevron]",
   };
   // What viser calls, and how often it has since this page was loaded.
@@ -371,9 +372,11 @@ const viserPage = (() => {
       buttons.role = "group";
       name(buttons, textOf(label) || "Choices");
     }
-    for (const icon of all(PARTS.settings)) {
-      const button = icon.closest("button");
-      if (!button.ariaLabel) name(button, "Settings of the page");
+    for (const [part, text] of [["settings", "Settings of the page"], ["commands", "Find by typing"]]) {
+      for (const icon of all(PARTS[part])) {
+        const button = icon.closest("button");
+        if (!button.ariaLabel) name(button, text);
+      }
     }
     for (const icon of all(PARTS.icon)) if (!icon.ariaHidden) icon.ariaHidden = "true";
     for (const head of all(PARTS.folderHead)) {
