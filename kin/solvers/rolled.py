@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kin.angles import wrapped
+from kin.angles import TURN, wrapped
 from kin.axes import is_zero, lines_of
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
@@ -62,10 +62,25 @@ def solve_approach(form: ClosedForm, problem: SolverInput, sense: float) -> Cand
     found.q[there, 6] = value
     spans = np.array([(i, low, high) for i in np.flatnonzero(there)], dtype=np.float64).reshape(-1, 3)
     values = np.column_stack([wrapped(rolls), np.where(there, value, math.nan)])
-    return replace(found, values=values, arcs=(_rolls(found.arcs[0], value, sense), spans))
+    further = found.further
+    return replace(
+        found,
+        values=values,
+        arcs=(_rolls(found.arcs[0], value, sense), spans),
+        further=None if further is None else lambda: _angles(further(), value, sense),
+    )
 
 
 def _rolls(arcs: Array, value: float, sense: float) -> Array:
     """Intervals ``(k, 3)`` of the difference θ − φ as intervals of φ."""
     ends = np.sort(sense * (value - arcs[:, 1:]), axis=1)
     return np.column_stack([arcs[:, :1], ends])
+
+
+def _angles(found: Array, value: float, sense: float) -> Array:
+    """Intervals ``(k, 2)`` of the difference θ − φ as intervals of φ in [−π, π]; one across ±π is given as two."""
+    ends = np.sort(sense * (value - found), axis=1)
+    low = wrapped(ends[:, :1])
+    whole = np.hstack([low, low + np.minimum(np.diff(ends), TURN)])
+    over = whole[whole[:, 1] > math.pi, 1] - TURN
+    return np.concatenate([np.minimum(whole, math.pi), np.column_stack([np.full(len(over), -math.pi), over])])

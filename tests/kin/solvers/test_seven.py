@@ -418,6 +418,26 @@ def test_an_approach_direction_leaves_two_parameters(robot):
     assert inside > 20
 
 
+def test_the_rolls_of_an_approach_are_those_at_which_there_is_a_posture():
+    """Also on branches that none of the answer's postures is on."""
+    rng, rolls, further = np.random.default_rng(13), np.linspace(-PI, PI, 182)[1:-1], 0
+    for q in SAWYER.random_q(rng, 3):
+        T = kin.fk(SAWYER, q)
+        result = kin.solve_ik(SAWYER, T, task="approach", q_seed=q)
+        turned = np.tile(T, (len(rolls), 1, 1))
+        turned[:, :3, 0] = np.cos(rolls)[:, None] * T[:3, 0] + np.sin(rolls)[:, None] * T[:3, 1]
+        turned[:, :3, 1] = np.cos(rolls)[:, None] * T[:3, 1] - np.sin(rolls)[:, None] * T[:3, 0]
+        rows = kin.ik_branches(SAWYER, turned, result.redundancy[1].value)
+        inside = ((rows - SAWYER.lower) % (2 * PI) <= SAWYER.upper - SAWYER.lower).all(axis=2).any(axis=1)
+        intervals = result.redundancy[0].intervals
+        own = [interval for s in result.solutions for interval in s.redundancy[0].intervals]
+        claimed = [any(low <= roll <= high for low, high in intervals) for roll in rolls]
+        assert all(-PI <= low <= high <= PI for low, high in intervals)
+        assert np.array_equal(inside, claimed)
+        further += sum(claimed) - sum(any(low <= roll <= high for low, high in own) for roll in rolls)
+    assert further > 0
+
+
 def test_a_tool_that_points_against_the_last_axis_rolls_the_other_way():
     robot = replace(PANDA, id="turned", tool=nested(PANDA.T_last_tool @ np.diag([1.0, -1.0, -1.0, 1.0])))
     q = np.array([0.2, -0.6, 0.3, -1.9, 0.2, 1.7, 0.9])
