@@ -220,7 +220,9 @@ class General7(ClosedForm):
             known = weakest(known, "agreed" if agreed else "searched")
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
-        further = (lambda: self._all_ranges(p, sweep)) if p.respect_limits else None
+        # Not the sweep itself: answers that are kept would keep the points of all self-motions.
+        kept = None if sweep is None else (sweep.ranges.copy(), sweep.inner.copy())
+        further = (lambda: self._all_ranges(p, kept)) if p.respect_limits else None
         return Candidates(out, values, (arcs,), completeness=known, further=further)
 
     def sweep(self, problem: SolverInput) -> Sweep:
@@ -321,11 +323,16 @@ class General7(ClosedForm):
             found.append((float(i), max(low, least), min(high, most)))
         return np.array(found).reshape(-1, 3)
 
-    def _all_ranges(self, problem: SolverInput, sweep: Sweep | None) -> Array:
-        """The values ``(k, 2)`` of the given joint at which any solution is inside the limits."""
+    def _all_ranges(self, problem: SolverInput, kept: tuple[Array, Array] | None) -> Array:
+        """The values ``(k, 2)`` of the given joint at which any solution is inside the limits.
+
+        Args:
+            kept: `ranges` and `inner` of the target's `Sweep`, None if it has not been searched.
+        """
         p, i = problem, self.given
-        sweep = sweep or self.sweeper.sweep(p)
-        ranges = sweep.ranges if self.sweeper is self else self._motions(p).follow(sweep.inner)[0][:, :2]
+        ranges, inner = kept or self.sweeper.sweep(p)[1:3]
+        if self.sweeper is not self:
+            ranges = self._motions(p).follow(inner)[0][:, :2]
         least, most = float(p.lower[i]), float(p.upper[i])
         if not len(ranges):
             return ranges

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import time
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -346,6 +347,22 @@ def test_what_only_one_of_two_ways_finds_is_not_agreed(monkeypatch):
     monkeypatch.setattr(form, "_at", solved)
     monkeypatch.setattr(general7.closed_form, "_VALUES", 1)  # the motions through few solutions are not all
     assert form.solve(asked).completeness == "searched"
+
+
+def test_an_answer_does_not_keep_the_points_of_self_motions(monkeypatch):
+    """They take megabytes, and batches keep an answer for each of their targets."""
+    form, swept, seen = closed_form_of(SAWYER), closed_form_of(SAWYER).sweep, []
+
+    def watched(problem):
+        sweep = swept(problem)
+        seen.append(weakref.ref(sweep.motions))
+        return sweep
+
+    monkeypatch.setattr(form, "sweep", watched)
+    found = form.solve(problem_at(SAWYER, kin.fk(SAWYER, SAWYER.random_q(np.random.default_rng(14)))))
+    assert [motions() for motions in seen] == [None]
+    assert len(found.further())
+    assert len(seen) == 1  # nothing is searched again
 
 
 @pytest.mark.parametrize("row", [8, 20])
