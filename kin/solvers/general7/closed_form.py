@@ -332,7 +332,10 @@ class General7(ClosedForm):
         p, i = problem, self.given
         ranges, inner = kept or self.sweeper.sweep(p)[1:3]
         if self.sweeper is not self:
-            ranges = self._motions(p).follow(inner)[0][:, :2]
+            pieces, _, lost = self._motions(p).follow(inner)
+            ranges = pieces[:, :2]
+            if lost.any():
+                ranges = np.concatenate([ranges, self.sweep(p).ranges])
         least, most = float(p.lower[i]), float(p.upper[i])
         if not len(ranges):
             return ranges

@@ -365,6 +365,32 @@ def test_an_answer_does_not_keep_the_points_of_self_motions(monkeypatch):
     assert len(seen) == 1  # nothing is searched again
 
 
+def swept_by_joint_1():
+    """Sawyer's solver with the search over the values of joint 1, as that of a calibrated arm."""
+    form = general7.General7(SAWYER, 6, closed_form_of(SAWYER).form)
+    form.sweeper = general7.General7(SAWYER, 0, closed_form_of(fixed(SAWYER, {0: 0.0})))
+    return form
+
+
+def test_the_intervals_of_a_motion_that_is_lost_are_searched_for_again(monkeypatch):
+    form, values = swept_by_joint_1(), np.linspace(SAWYER.lower[6], SAWYER.upper[6], 302)[1:-1]
+    T = kin.fk(SAWYER, SAWYER.random_q(np.random.default_rng(12)))
+    asked = problem_at(SAWYER, T)
+    whole, found, made, plain = form.solve(asked).further(), form.solve(asked), [], form._motions
+
+    def first_lost(problem):
+        motions = plain(problem)
+        if not made:
+            motions.follow = lambda starts: (np.empty((0, 3)), np.empty((0, 3, 7)), np.ones(len(starts), bool))
+        made.append(motions)
+        return motions
+
+    monkeypatch.setattr(form, "_motions", first_lost)
+    claimed = [general7.closed_form._counts(each, values) > 0 for each in (whole, found.further())]
+    assert claimed[0].any()
+    assert np.array_equal(*claimed)
+
+
 @pytest.mark.parametrize("row", [8, 20])
 def test_no_narrow_best_value_is_passed_over(row):
     """Against thousands of values; with fewer samples and peaks the answer was 1.5 % short of the best."""
