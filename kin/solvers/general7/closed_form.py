@@ -269,6 +269,8 @@ class General7(ClosedForm):
         squares, least = np.empty(len(q)), math.inf
         to_images(q, p.seed, lower, upper, squares)
         best = float(p.seed[i])
+        if squares.min() == math.inf and self.sweeper is not self:
+            sweep = self.sweep(p)  # at values of the given joint inside its limits
         if squares.min() == math.inf > sweep.outside.min():
             best = float(sweep.rows[sweep.outside.argmin(), i])
         for _ in range(_DOWNHILL):

@@ -391,6 +391,18 @@ def test_the_intervals_of_a_motion_that_is_lost_are_searched_for_again(monkeypat
     assert np.array_equal(*claimed)
 
 
+@pytest.mark.parametrize("seed", [9, 59])
+def test_the_value_of_what_is_least_outside_is_one_that_the_given_joint_may_have(seed):
+    """The search over joint 1 finds it where joint 7 is outside: at the end of its range are others, or none."""
+    form, q = swept_by_joint_1(), SAWYER.random_q(np.random.default_rng(seed))
+    lower, upper = SAWYER.lower.copy(), SAWYER.upper.copy()
+    lower[3], upper[3] = q[3] + 0.3, q[3] + 0.4
+    lower[6], upper[6] = q[6] - 0.2, q[6] + 0.2
+    asked = SolverInput(kin.fk(SAWYER, q), POSE, (math.nan,), True, SAWYER.q_home, lower, upper)
+    found = form._outside(asked, form.solve(asked).q)
+    assert 0.0 < found.min() <= form.sweep(asked).outside.min() + 1e-9
+
+
 @pytest.mark.parametrize("row", [8, 20])
 def test_no_narrow_best_value_is_passed_over(row):
     """Against thousands of values; with fewer samples and peaks the answer was 1.5 % short of the best."""
