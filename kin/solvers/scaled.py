@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.differential.metric import extent
-from kin.robot import Joint, Robot
+from kin.robot import Joint, NominalTable, Robot
 from kin.solvers.contract import (
     POSE,
     BatchKernels,
@@ -54,6 +54,9 @@ def in_unit(robot: Robot, unit: float) -> Robot:
     def pose(T: Array) -> tuple[tuple[float, ...], ...]:
         return tuple(map(tuple, _moved(T, 1.0 / unit).tolist()))
 
+    nominal = robot.nominal
+    if nominal is not None:
+        nominal = NominalTable(tuple(map(row, nominal.rows)), pose(np.array(nominal.tool)))
     return replace(
         robot,
         rows=tuple(map(row, robot.rows)),
@@ -62,6 +65,7 @@ def in_unit(robot: Robot, unit: float) -> Robot:
         tool=pose(robot.T_last_tool),
         capsules=(),
         floor=None,
+        nominal=nominal,
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kin.angles import TURN, wrapped
 from kin.axes import frame_of, inverse, lines_of, perpendicular_to, size
+from kin.fk import fk
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import turn_around
@@ -41,6 +42,7 @@ NAME = "general7"
 TITLE = "all solutions, seven revolute joints of which one is given"
 # Values of a turn at which all solutions are computed, also where a nominal arm has some; how far outside limits
 # self-motions are followed (rad); how much wider the nominal arm's limits and reach are (rad, arm sizes).
+# With what the nominal arm finds, the tool may be _WIDER off: in arm sizes, and in each entry of its rotation.
 _VALUES, _FEWER, _MARGIN, _WIDER, _LONGER = 48, 12, 0.6, 0.1, 0.01
 # Of the search for the nearest solution: self-motions that are followed downhill, how far from those before they
 # begin, and how much farther from the seed than the nearest one (rad): more than half the way to the next point.
@@ -257,7 +259,11 @@ class General7(ClosedForm):
         lower, upper = p.lower - _WIDER, p.upper + _WIDER
         arcs = self.nominal.solve(replace(p, values=free, respect_limits=True, lower=lower, upper=upper)).arcs[0]
         T = np.ascontiguousarray(np.broadcast_to(p.T, (len(arcs), 4, 4)))
-        return self.nominal.rows_at(T, arcs[:, 1:].mean(axis=1), p.seed, arcs[:, 0].astype(np.intp))
+        q = self.nominal.rows_at(T, arcs[:, 1:].mean(axis=1), p.seed, arcs[:, 0].astype(np.intp))
+        q = q[~np.isnan(q[:, 0])]
+        off = np.abs(fk(self.robot, q) - p.T)
+        off[:, :3, 3] /= size(self.robot)
+        return q[(off < _WIDER).all(axis=(1, 2))]
 
     def _value_of_nearest(self, problem: SolverInput, sweep: Sweep) -> float:
         """The value of the given joint at the solution nearest to the seed; motions are followed downhill.

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import kin
+from kin.robot import NominalTable
 from kin.solvers import closed_form_of
-from kin.solvers.scaled import Scaled, unit_of
+from kin.solvers.scaled import Scaled, in_unit, unit_of
 
 # One arm of each family.
 FEW = ("pioneer5", "redundant7", "panda", "ur5", "stanford", "gp8", "so101", "scara", "gen3", "rpp", "crx10ia")
@@ -105,3 +106,11 @@ def test_arms_of_ordinary_size_are_solved_in_metres():
     form = closed_form_of(scaled(kin.get_robot("ur5"), 1e-3))
     assert isinstance(form, Scaled)
     assert np.log2(form.unit) == round(np.log2(form.unit))  # so that no length is rounded
+
+
+def test_the_nominal_table_of_an_arm_is_in_its_unit():
+    small = scaled(kin.get_robot("panda"), 1e-3)
+    made = replace(small, nominal=NominalTable(small.rows, small.tool))
+    there = in_unit(made, unit_of(made))
+    assert there.nominal_arm.rows == there.rows
+    assert there.nominal_arm.tool == there.tool

@@ -403,6 +403,20 @@ def test_the_value_of_what_is_least_outside_is_one_that_the_given_joint_may_have
     assert 0.0 < found.min() <= form.sweep(asked).outside.min() + 1e-9
 
 
+@pytest.mark.parametrize(("nominal", "count"), [(SAWYER, 12), (PANDA, 48)], ids=["close", "far"])
+def test_only_a_nominal_arm_that_is_close_leaves_values_out(nominal, count, monkeypatch):
+    form, tried = general7.General7(SAWYER, 6, closed_form_of(SAWYER).form), []
+    form.nominal = closed_form_of(nominal)
+    solved = form._at
+    monkeypatch.setattr(
+        form, "_at", lambda problem, values: (tried.append(len(values)), solved(problem, values))[1]
+    )
+    T = kin.fk(SAWYER, SAWYER.random_q(np.random.default_rng(12)))
+    assert len(form.nominal.solve(problem_at(SAWYER, T)).arcs[0])
+    assert form.sweep(problem_at(SAWYER, T)).agreed
+    assert tried == [count + 1]  # and the seed's value
+
+
 @pytest.mark.parametrize("row", [8, 20])
 def test_no_narrow_best_value_is_passed_over(row):
     """Against thousands of values; with fewer samples and peaks the answer was 1.5 % short of the best."""
