@@ -23,6 +23,7 @@ from kin.ik.details import RollError, RotationError, Solved, Touching
 from kin.ik.problem import IKProblem
 from kin.ik.results import Cause, IKResult, Status
 from kin.singularity import singularities_at
+from kin.solvers.contract import weakest
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -237,4 +238,6 @@ class _Search:
         if best is not None:
             branches = self.branches
             branches.q[:], branches.stats[:], branches.values[:] = best.q, best.stats, best.values
+            branches.arcs, branches.closed = best.arcs, best.closed
+            branches.completeness = weakest(best.completeness, "searched")  # at the best value of many
             good[:] = best.good

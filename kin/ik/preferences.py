@@ -90,7 +90,8 @@ def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
     """
     assert problem.closed_form is not None  # whose branches these are
     form = problem.closed_form
-    if form.redundancies(POSE) and not form.steady and problem.code == POSE and not problem.requested:
+    changing = bool(form.redundancies(POSE)) and not form.steady
+    if changing and problem.code == POSE and not problem.requested:
         _improve_all(problem, branches, good)
         return
     branches.q, branches.stats = centred(problem, branches.q)
@@ -103,6 +104,8 @@ def improve(problem: IKProblem, branches: Branches, good: Flags) -> None:
         else:
             for row in there.tolist():
                 _improve_row(problem, branches, score, row, k)
+    if changing and problem.searched:
+        branches.completeness = weakest(branches.completeness, "searched")  # rows at values of their own
 
 
 def _improve_all(problem: IKProblem, branches: Branches, good: Flags) -> None:

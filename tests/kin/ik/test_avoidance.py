@@ -133,6 +133,28 @@ def test_arms_with_few_joints_leave_out_what_touches_too():
     assert len(found.solutions) < len(plain.solutions)
 
 
+SAWYER = kin.get_robot("sawyer")
+
+
+def beside_a_ball() -> tuple[np.ndarray, np.ndarray, list[kin.Obstacle]]:
+    """A configuration, its pose, and an obstacle that all postures at its value of joint 7 touch."""
+    q = SAWYER.random_q(np.random.default_rng(20))
+    T, ball = kin.fk(SAWYER, q), ball_at(SAWYER, q, 0.15)
+    assert all(kin.clearance(SAWYER, s.q, [ball]) < 0.0 for s in kin.solve_ik(SAWYER, T, q_seed=q).solutions)
+    return q, T, [ball]
+
+
+def test_postures_at_another_value_have_the_intervals_of_that_value_and_are_searched():
+    q, T, balls = beside_a_ball()
+    assert kin.solve_ik(SAWYER, T, q_seed=q).completeness == "agreed"
+    found = kin.solve_ik(SAWYER, T, q_seed=q, obstacles=balls)
+    assert (found.status, found.completeness) == ("solved", "searched")
+    for solution in found.solutions:
+        (parameter,) = solution.redundancy
+        assert parameter.value == solution.q[6]
+        assert any(low <= parameter.value <= high for low, high in parameter.intervals)
+
+
 def test_a_numeric_arm_finds_another_posture():
     arm = kin.Robot.from_dh([(0.0, 0.3, 0.02 * i, 0.7 * (-1) ** i) for i in range(6)])
     q = np.full(6, 0.6)

@@ -507,6 +507,13 @@ def test_the_rolls_of_an_approach_are_those_at_which_there_is_a_posture():
     assert further > 0
 
 
+def test_an_approach_whose_values_were_searched_by_a_preference_is_not_agreed():
+    q = SAWYER.random_q(np.random.default_rng(8))
+    given = {"theta7": float(q[6])}
+    result = kin.solve_ik(SAWYER, kin.fk(SAWYER, q), task="approach", q_seed=q, prefer="limits", redundancy=given)
+    assert (result.status, result.completeness) == (Status.SOLVED, "searched")
+
+
 def test_a_tool_that_points_against_the_last_axis_rolls_the_other_way():
     robot = replace(PANDA, id="turned", tool=nested(PANDA.T_last_tool @ np.diag([1.0, -1.0, -1.0, 1.0])))
     q = np.array([0.2, -0.6, 0.3, -1.9, 0.2, 1.7, 0.9])
