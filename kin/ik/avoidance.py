@@ -132,7 +132,7 @@ def free_rows(problem: IKProblem, branches: Branches, good: Flags) -> Flags:
     search = _Search(problem, branches, around(problem))
     if not search.steady:
         if not free.any():
-            search.everywhere(good)
+            search.everywhere(good, open_ones[0])
             free = good & is_free(problem, branches.q)
         return free
     step = _STEP if len(open_ones) == 1 else 4.0 * _STEP
@@ -214,13 +214,15 @@ class _Search:
             step *= 0.2
         return np.asarray(np.isfinite(best))
 
-    def everywhere(self, good: Flags) -> None:
-        """All rows at the value at which one of them is best, in place, where rows are not branches."""
+    def everywhere(self, good: Flags, k: int) -> None:
+        """All rows at the value of parameter k at which one is best, in place, where rows are not branches."""
         problem = self.problem
-        joint = problem.redundancies[0].joint
-        low, high = float(problem.lower[joint]), float(problem.upper[joint])
-        if not math.isfinite(high - low) or not problem.respect:
-            low, high = float(problem.seed[joint]) - math.pi, float(problem.seed[joint]) + math.pi
+        joint = problem.redundancies[k].joint
+        low, high = -math.pi, math.pi  # of a roll
+        if joint >= 0:
+            low, high = float(problem.lower[joint]), float(problem.upper[joint])
+            if not math.isfinite(high - low) or not problem.respect:
+                low, high = float(problem.seed[joint]) - math.pi, float(problem.seed[joint]) + math.pi
         step = _STEP
         values = np.linspace(low, high, max(2, math.ceil((high - low) / step) + 1)).tolist()
         least = math.inf
@@ -228,7 +230,7 @@ class _Search:
         for _ in range(_ZOOMS + 1):
             middle = None
             for value in values:
-                found, key = self.at((value, *problem.values[1:]))
+                found, key = self.at((*problem.values[:k], value, *problem.values[k + 1 :]))
                 if key.min() < least:
                     least, best, middle = float(key.min()), found, value
             if middle is None:

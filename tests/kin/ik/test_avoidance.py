@@ -155,6 +155,15 @@ def test_postures_at_another_value_have_the_intervals_of_that_value_and_are_sear
         assert any(low <= parameter.value <= high for low, high in parameter.intervals)
 
 
+def test_a_requested_roll_is_kept_and_joint_7_is_searched():
+    q, T, balls = beside_a_ball()
+    found = kin.solve_ik(SAWYER, T, task="approach", q_seed=q, redundancy={"roll": 0.0}, obstacles=balls)
+    assert found.status == "solved"
+    for solution in found.solutions:
+        assert kin.clearance(SAWYER, solution.q, balls) >= 0.0
+        assert solution.redundancy[0].value == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_numeric_arm_finds_another_posture():
     arm = kin.Robot.from_dh([(0.0, 0.3, 0.02 * i, 0.7 * (-1) ** i) for i in range(6)])
     q = np.full(6, 0.6)
