@@ -76,6 +76,7 @@ def test_looking_at_the_pages_makes_no_file_and_no_thread(make, tmp_path):
 def test_a_class_joins_by_code_and_ends(make, tmp_path):
     teacher, student = make(), make()
     code = open_room(teacher)
+    assert "your answers with times, and how many were right in <i>Review</i>" in student.get("/room").text
     answer = join(student, code.lower().replace("-", " "))
     assert (answer.status_code, answer.headers["location"]) == (303, "../viewer/")
     cookie = answer.headers["set-cookie"]

@@ -23,7 +23,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide import earlier
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.review.arms import other_arm
-from app.viewer.review.views import Counts
+from app.viewer.review.views import Counts, list_html
 from kin.solvers import family_of
 from kin.units import Units
 
@@ -440,3 +440,9 @@ def test_a_question_that_no_other_arm_has_stays_on_its_arm() -> None:
 )
 def test_the_row_says_how_much_is_due(due: int, later: int, days: int, words: str) -> None:
     assert Counts(due, later, days).words == words
+
+
+def test_students_read_what_the_teacher_sees_of_their_answers() -> None:
+    words = "Your teacher does not see what you answer here, only how much of it was right in the whole class."
+    assert words in list_html(Review(), ALL, seated=True)
+    assert "Your teacher" not in list_html(Review(), ALL, seated=False)

@@ -13,7 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
-from app.classroom import ClassroomUnavailable, Confirmed, NewAttempt, RefusedError, RoomView, SeatView, Task
+from app.classroom import (
+    ClassroomUnavailable,
+    Confirmed,
+    NewAttempt,
+    RefusedError,
+    RoomView,
+    SeatView,
+    Task,
+    tables,
+)
 from app.classroom.courses import SentExercises
 from app.classroom.standing import standing
 from app.classroom.work import ANSWER_SHOWN, Attempt, Work, works
@@ -279,3 +288,30 @@ def test_a_wall_says_how_many_arms_it_shows(arms: int, words: str) -> None:
 
 def plain(html: str) -> str:
     return " ".join(re.sub("<[^>]+>", " ", html).split())
+
+
+SAID = {  # what is stored of a student and of an answer, by column, and how the page says so
+    "alias": "Your alias",
+    "joined": "when you joined",
+    "page": "your arm and its position",
+    "task": "the exercise you have open",
+    "gone": "whether you follow the teacher",
+    "driven": "a machine that a program moves",
+    "hand": "your raised hand",
+    "vote": "your votes",
+    "recalled": "how many answers in <i>Review</i> were right",
+    "answer": "your answers to exercises",
+    "verdict": "verdicts",
+    "cause": "recognised mistakes",
+    "at": "times",
+}
+KEPT = {"id", "room_id", "seat_id", "removed", "beat", "version"}  # by the service, of no interest to students
+FOLLOW = {"tries", "solved", "voted", "exercise", "seed", "score", "started"}  # from what is said
+
+
+def test_students_read_what_is_stored_of_them() -> None:
+    columns = {column.name for table in (tables.Seat, tables.Attempt) for column in table.__table__.columns}
+    assert columns == SAID.keys() | KEPT | FOLLOW, "a new column needs its words"
+    html = views.stored_html(RoomView("r", ends=60.0), 0.0)
+    assert [words for words in SAID.values() if words not in html] == []
+    assert "votes, and how much was right in <i>Review</i>, only as numbers of the class" in html
