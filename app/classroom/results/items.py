@@ -20,7 +20,7 @@ from app.classroom.results.table import Member
 from app.classroom.work import Attempt
 from app.exercises.questions import RELATED, WRITTEN
 
-MOST = 6  # causes of an exercise, and wordings of a cause
+MOST = 6  # causes of an exercise
 FEW = 8  # students, below whom nothing is said about an exercise
 EASY, HARD = 0.95, 0.2  # shares of students who are right at the first try
 LEAST_DISCRIMINATION = 0.2  # below, an item is to be eliminated, or completely revised (Ebel, 1965)
@@ -50,7 +50,8 @@ class Cause:
 
     Attributes:
         code: as `app.exercises.questions.Verdict` has it; empty: the mistake is known by its words alone.
-        reasons: those of the most students first, `MOST` at most.
+        reasons: those of the most students first.
+        students: how many gave such answers; each of them is in one of the reasons, or in several.
     """
 
     code: str
@@ -150,14 +151,15 @@ def _causes(names: dict[str, str], attempts: Iterable[Attempt]) -> dict[str, tup
             reasons.setdefault(words, (one.verdict, set()))[1].add(one.seat)
     found = {}
     for exercise, causes in wrong.items():
-        made = [
-            Cause(code, _reasons(names, reasons), len(set[str]().union(*(seats for _, seats in reasons.values()))))
+        counted = [
+            (len(set[str]().union(*(seats for _, seats in reasons.values()))), code, reasons)
             for (code, _), reasons in causes.items()
         ]
-        found[exercise] = tuple(sorted(made, key=lambda cause: -cause.students)[:MOST])
+        most = sorted(counted, key=lambda cause: -cause[0])[:MOST]
+        found[exercise] = tuple(Cause(code, _reasons(names, reasons), count) for count, code, reasons in most)
     return found
 
 
 def _reasons(names: dict[str, str], reasons: dict[str, tuple[str, set[str]]]) -> tuple[Reason, ...]:
-    listed = sorted(reasons.values(), key=lambda reason: -len(reason[1]))[:MOST]
+    listed = sorted(reasons.values(), key=lambda reason: -len(reason[1]))
     return tuple(Reason(words, tuple(names[seat] for seat in names if seat in seats)) for words, seats in listed)

@@ -195,6 +195,16 @@ def test_a_mistake_with_a_code_is_one_cause_however_it_is_worded() -> None:
     )
 
 
+def test_a_cause_names_each_of_its_students_however_many_wordings_it_has() -> None:
+    said = [f"The other sign of joint {i}." for i in range(2 * MOST)]
+    seats = [f"s{i}" for i in range(2 * MOST)]
+    given = [wrong(seat, words, cause="sign") for seat, words in zip(seats, said, strict=True)]
+    (cause,) = items(members_of(*seats), given)[0].causes
+    assert cause.students == 2 * MOST
+    assert [reason.words for reason in cause.reasons] == said
+    assert {name for reason in cause.reasons for name in reason.students} == {seat.title() for seat in seats}
+
+
 def test_reasons_that_differ_by_the_numbers_of_each_student_are_one() -> None:
     said = ("The sine, 0.5 m, was taken for the cosine.", "The sine, −1.5 m, was taken for the cosine.")
     given = [wrong("di", said[0]), wrong("ed", said[1])]
