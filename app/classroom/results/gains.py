@@ -9,6 +9,8 @@ may be harder: this adds to the differences of one order what it takes from thos
 an order it is the same for all, so it is not in the interval either, which is that of Student's t for a two-period
 crossover (Senn, *Cross-over Trials in Clinical Research*, 2002, chapter 3); where all had the same order, that of
 paired differences. A bootstrap would be too narrow with so few students. Below `LEAST` of them, no gain is said.
+Where all of an order changed alike, as often with one question that is right or wrong, the spread is unknown, not
+0: there is no interval.
 
 With scores from 0 to 1, the normalised gain is (Hake, 1998)::
 
@@ -39,7 +41,7 @@ COLUMNS = (
 )
 ALL = "all"  # the item that stands for all of them
 CLASS = "class"  # the student who stands for all of them
-EXACT = 1e-9  # below this, nothing was missing before
+EXACT = 1e-9  # below this, nothing was missing before, or all changed alike
 LEAST = 8  # students who answered both
 CONFIDENCE = 0.95
 
@@ -55,7 +57,9 @@ class Gain:
         students: how many answered both.
         exchanged: whether a student has answered the second exercise of the pair first.
         enough: whether there are enough students for a gain.
-        margin: of a class with enough students, half of the interval of after - before.
+        margin: of a class with enough students, half of the interval of after - before; None: all
+            of an order changed alike.
+        orders: of a class, in how many orders those who answered both did; 0: of a student, or nobody.
     """
 
     before: float | None
@@ -64,6 +68,7 @@ class Gain:
     exchanged: bool = False
     enough: bool = True
     margin: float | None = None
+    orders: int = 0
 
     @property
     def difference(self) -> float | None:
@@ -170,12 +175,15 @@ def _of_class(found: Sequence[Gain]) -> Gain:
         return Gain(None, None, 0, enough=False)
     before, after = (fmean(column) for column in zip(*map(_means, orders), strict=True))
     if len(both) < LEAST:
-        return Gain(before, after, len(both), enough=False)
+        return Gain(before, after, len(both), enough=False, orders=len(orders))
     differences = [[one.difference or 0.0 for one in order] for order in orders]
     freedom = len(both) - len(orders)
     squares = sum((each - fmean(order)) ** 2 for order in differences for each in order)
+    if squares < EXACT:
+        return Gain(before, after, len(both), orders=len(orders))
     error = math.sqrt(squares / freedom * sum(1.0 / len(order) for order in orders)) / len(orders)
-    return Gain(before, after, len(both), margin=t_quantile(0.5 + CONFIDENCE / 2.0, freedom) * error)
+    margin = t_quantile(0.5 + CONFIDENCE / 2.0, freedom) * error
+    return Gain(before, after, len(both), margin=margin, orders=len(orders))
 
 
 def _means(both: Sequence[Gain]) -> tuple[float, float]:

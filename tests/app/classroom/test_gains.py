@@ -17,7 +17,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import update
 
-from app.classroom import COOKIE, NewAttempt, Ticket, tables
+from app.classroom import COOKIE, Hub, NewAttempt, Ticket, tables
 from app.classroom.courses import Course, Item, parse_course, to_data
 from app.classroom.results.gains import (
     COLUMNS,
@@ -115,9 +115,11 @@ def test_a_harder_exercise_is_no_gain_of_a_class_in_two_orders() -> None:
     first, second = [(0.5, 0.6)] * 5, [(0.3, 0.8)] * 3  # 0.3 was gained; the second exercise is harder by 0.2
     one = answered(first, second).items[0]
     assert one.difference == pytest.approx(0.3)
-    assert one.interval == pytest.approx((0.3, 0.3), abs=1e-6), "all have gained the same"
+    assert (one.interval, one.orders) == (None, 2), "all of an order have changed alike: the spread is unknown"
     assert (one.before, one.after) == pytest.approx((0.4, 0.7))
-    assert answered(first * 2, []).items[0].difference == pytest.approx(0.1), "one order alone does not see it"
+    alone = answered(first * 2, []).items[0]
+    assert alone.difference == pytest.approx(0.1), "one order alone does not see it"
+    assert alone.orders == 1
 
 
 def test_the_interval_of_two_orders_is_that_of_a_crossover() -> None:
@@ -130,6 +132,40 @@ def test_the_interval_of_two_orders_is_that_of_a_crossover() -> None:
     found = answered(first, second)
     assert found.items[0].interval == pytest.approx((middle - margin, middle + margin), abs=1e-4)
     assert found.whole.interval == found.items[0].interval, "there is one pair alone"
+
+
+RIGHT_OR_WRONG = [(0.0, 1.0), (1.0, 0.0), (0.0, 0.0), (1.0, 1.0)]  # before and after: of these, two differ alike
+
+
+@pytest.mark.parametrize("each", [4, 5, 6])
+def test_intervals_of_one_question_that_is_right_or_wrong_are_wide_enough(each: int) -> None:
+    """Of all classes with so many students in each order; none has an interval without width."""
+    orders = [(up, down) for up in range(each + 1) for down in range(each + 1 - up)]
+
+    def students(up: int, down: int) -> list[tuple[float, float]]:
+        return [(0.0, 1.0)] * up + [(1.0, 0.0)] * down + [(0.0, 0.0)] * (each - up - down)
+
+    found = {
+        (one, two): answered(students(*one), students(*two)).items[0].interval for one in orders for two in orders
+    }
+    widths = [high - low for low, high in filter(None, found.values())]
+    assert min(widths) > 0.2
+    for before, after in ((0.5, 0.7), (0.3, 0.8), (0.9, 0.95), (0.6, 1.0)):
+        rise, fall = (1.0 - before) * after, before * (1.0 - after)
+        chance = {
+            (up, down): math.comb(each, up)
+            * math.comb(each - up, down)
+            * rise**up
+            * fall**down
+            * (1.0 - rise - fall) ** (each - up - down)
+            for up, down in orders
+        }
+        given = covered = 0.0
+        for (one, two), interval in found.items():
+            if interval is not None:
+                given += chance[one] * chance[two]
+                covered += chance[one] * chance[two] * (interval[0] <= after - before <= interval[1])
+        assert covered / given >= 0.92, (before, after)
 
 
 @pytest.mark.parametrize(
@@ -238,6 +274,13 @@ def service(tmp_path: Path) -> Iterator[object]:
     app.state.classroom.close()
 
 
+def send_course(hub: Hub, room: str) -> None:
+    """The room follows the course from now on."""
+    with hub.database.write() as connection:
+        state = {"course": json.dumps(to_data(COURSE))}
+        connection.execute(update(tables.Room).where(tables.Room.id == room).values(state=state))
+
+
 def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
     hub = service.state.classroom  # type: ignore[attr-defined]
     room = hub.rooms.open("Class", 3600.0)
@@ -248,9 +291,7 @@ def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
 
     teacher = browser(Ticket(room.id))
     assert "Did they learn?" not in teacher.get("/room/results").text
-    with hub.database.write() as connection:
-        state = {"course": json.dumps(to_data(COURSE))}
-        connection.execute(update(tables.Room).where(tables.Room.id == room.id).values(state=state))
+    send_course(hub, room.id)
     ada = hub.rooms.join(room.code, "<b>Ada")
     for exercise, score in (("two-elbows", 0.25), ("two-elbows", 1.0), ("other-wrist", 0.7)):
         hub.rooms.submit(ada, NewAttempt(exercise, 7, ["30"], "Too large.", score, started=0.0))
@@ -270,3 +311,34 @@ def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
     assert [row["gain"] for row in rows if row["student"] == "1"] == ["0.600", "", "0.600"]
     for path in ("/room/results", "/room/gains.csv"):
         assert browser(ada).get(path).status_code == 403
+
+
+def test_a_gain_without_spread_or_in_one_order_says_so(service: object) -> None:
+    hub = service.state.classroom  # type: ignore[attr-defined]
+    room = hub.rooms.open("Class", 3600.0)
+    send_course(hub, room.id)
+    cookies = {COOKIE: hub.rooms.tokens.sign(Ticket(room.id))}
+    teacher = TestClient(service, base_url="http://school.example", cookies=cookies)  # type: ignore[arg-type]
+
+    def answer(before: float, after: float, order: int = 1) -> None:
+        seat = hub.rooms.join(room.code, "Ada")
+        for exercise, score in zip(PAIRS[0][::order], (before, after), strict=True):
+            hub.rooms.submit(seat, NewAttempt(exercise, 7, ["30"], "Too large.", score, started=0.0))
+
+    def said() -> str:
+        """The row of the class."""
+        return teacher.get("/room/results").text.split("<table data-gains>")[1].split("</tr>")[1]
+
+    for _ in range(8):
+        answer(0.2, 0.5)
+    assert "+30 points (no interval: within each order, all changed alike)" in said()
+    alone = "all in one order: a harder exercise counts as a loss, an easier one as a gain"
+    assert said().count(alone) == 2, "of the pair, and of all"
+    answer(0.3, 0.4, order=-1)
+    assert "+20 points (no interval" in said()
+    assert alone not in said(), "the difficulties cancel"
+    answer(0.6, 0.6)
+    assert re.search(r"\+18 points \(95 %: [−+]\d+ to \+\d+\)", said())
+    assert "no interval" not in said()
+    rows = teacher.get("/room/results").text.split("<table data-gains>")[1].split("</tr>")[2:]
+    assert not any("points" in row for row in rows), "a student has none"

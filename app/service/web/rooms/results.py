@@ -186,9 +186,13 @@ def _compared(row: Gains) -> dict[str, object]:
 def _in_words(one: Gain) -> dict[str, object]:
     scores = ["–" if value is None else f"{100 * value:.0f} %" for value in (one.before, one.after)]
     said = []
-    if one.interval is not None and one.difference is not None:
-        low, high = (f"{100 * end:+.0f}" for end in one.interval)
-        said.append(f"{100 * one.difference:+.0f} points (95 %: {low} to {high})".replace("-", "−"))
+    if one.orders and one.difference is not None:
+        interval = "no interval: within each order, all changed alike"
+        if one.interval is not None:
+            interval = "95 %: {:+.0f} to {:+.0f}".format(*(100.0 * end for end in one.interval))
+        said.append(f"{100 * one.difference:+.0f} points ({interval})".replace("-", "−"))
+        if one.orders == 1:
+            said.append("all in one order: a harder exercise counts as a loss, an easier one as a gain")
     if one.gain is not None:
         said.append(f"g = {fixed(one.gain, 2)}")
     elif one.difference is not None:
