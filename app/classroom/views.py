@@ -214,8 +214,9 @@ class Recalled(NamedTuple):
     """Counts of what was asked again in *Review*: of one answer, of a student or of a class.
 
     Attributes:
-        late, late_right: what was asked seven days and more after the last answer, and how much of it was right.
-        new, new_right: the same of questions about an arm about which they were never asked before.
+        late, late_right: what was asked seven days and more after the last answer that counted, and how much of it
+            was right.
+        new, new_right: the same of questions about another arm than those that the list of what was missed knows.
     """
 
     late: int = 0

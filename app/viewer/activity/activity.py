@@ -100,6 +100,7 @@ class Activity:
         progress: the open course and its item on show.
         review: what was missed, and when it is asked again.
         asked_again: exercises that are asked again, with numbers and marks of their own, which nobody else sees.
+        question_again: the key of a lesson’s question that is asked again, until the lesson is left; or empty.
         sent: the course that the teacher of the room sent.
         draft: the exercise that is written in this page.
         lent: an exercise that the room brings along.
@@ -117,6 +118,7 @@ class Activity:
         self.progress = Progress(courses, self.practice, secret)
         self.review = Review()
         self.asked_again = Practice(self.exercises)
+        self.question_again = ""
         self.lesson: str | None = None
         self.sent: Course | None = None
         self.draft: Exercise | None = None
@@ -243,20 +245,24 @@ class Activity:
         self.take_exercise(exercise, right=False)
         return True
 
-    def take_exercise(self, exercise: Exercise, right: bool) -> None:
+    def take_exercise(self, exercise: Exercise, right: bool, again: bool = False) -> None:
         """An exercise was answered, or its answer shown: what was missed comes back.
 
         Only exercises of the service do; others may be gone by then.
+
+        Args:
+            again: whether *Review* asked it, which counts as remembered or not.
         """
         if self.courses.exercises.get(exercise.id) is not None:
-            self._take_again(exercise.id, right)
+            self._take_again(exercise.id, right, again)
 
     def take_question(self, lesson: str, question: str, robot_id: str, right: bool) -> None:
         """A question of a lesson was answered about this arm, or its answer shown."""
-        self._take_again(question_key(lesson, question), right, robot_id)
+        key = question_key(lesson, question)
+        self._take_again(key, right, key == self.question_again, robot_id)
 
-    def _take_again(self, key: str, right: bool, robot: str = "") -> None:
-        recalled = self.review.recalled(key, right, robot)
+    def _take_again(self, key: str, right: bool, again: bool, robot: str = "") -> None:
+        recalled = self.review.recalled(key, right, robot) if again else None
         self.review.take(key, right, robot)
         if recalled is not None and self._seat is not None:
             self._seat.tell_recalled(recalled)

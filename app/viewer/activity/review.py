@@ -53,10 +53,8 @@ class Missed:
     before: tuple[str, ...] = ()
 
     def about(self, robot: str) -> Missed:
-        """The same about another arm."""
-        if robot == self.robot:
-            return self
-        before = tuple(dict.fromkeys((self.robot, *self.before)))[:MOST_ARMS]
+        """The same, asked about this arm, which may be the present one."""
+        before = tuple(dict.fromkeys((self.robot, *self.before)))[:MOST_ARMS] if self.robot else self.before
         return replace(self, robot=robot, before=before)
 
     @property
@@ -130,7 +128,7 @@ class Review:
         return new != known
 
     def move(self, key: str, robot: str) -> None:
-        """A question of a lesson is asked about another arm."""
+        """A question of a lesson is asked about this arm."""
         self.missed[key] = self.missed[key].about(robot)
 
     def recalled(self, key: str, right: bool, robot: str = "") -> Recalled | None:

@@ -100,6 +100,7 @@ class Reviewing(Practising):
         robot = other_arm(lesson, missed.question, robot, stage.store.robots, random.Random())
         self._review.move(missed.key, robot.id)
         self._asked_in, self._arrived = lesson.key, False
+        stage.activity.question_again = missed.key
         stage.activity.leave_item()
         if stage.now.robot != robot:
             stage.change_robot(robot)
@@ -121,7 +122,7 @@ class Reviewing(Practising):
 
     def _judged(self, exercise: Exercise) -> None:
         mark = self._practice.record(exercise).mark
-        self.stage.activity.take_exercise(exercise, right=mark == "right")
+        self.stage.activity.take_exercise(exercise, right=mark == "right", again=True)
         self.stage.activity.progress.look_back(exercise.id, mark)
 
     def _following(self, exercise: Exercise) -> Following | None:
@@ -151,7 +152,7 @@ class Reviewing(Practising):
         counts = views.Counts.of(self._review, activity.courses.exercises)
         here = self._asked_in != "" and activity.lesson == self._asked_in
         if self._arrived and not here:
-            self._asked_in = ""
+            self._asked_in = activity.question_again = ""
         self._arrived = here
         row = views.row_html(self.title, counts, activity.practice.seated) if activity.lesson is None else ""
         update_html(self._row, row)

@@ -100,7 +100,7 @@ def test_the_teacher_sees_causes_figures_and_what_is_remembered(school: Class) -
     assert '<meter max="8" value="7"' in row
     assert "<b>7</b> sign</summary>" in row
     assert "The other &lt;sign&gt;.<br><bdi>&lt;b&gt;1, &lt;b&gt;2" in row
-    assert "seven days and more after the last answer: 1 of 2 right." in text
+    assert "seven days and more after the last answer that counted there: 1 of 2 right." in text
     file = teacher.get("/room/results.csv").content.decode("utf-8-sig")
     assert [one["cause"] for one in csv.DictReader(io.StringIO(file))][:3] == ["", "", ""]
     assert file.count(",sign\r\n") == 3 + 7

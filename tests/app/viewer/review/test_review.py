@@ -133,6 +133,10 @@ def test_what_is_remembered_after_a_week_and_about_a_new_arm_is_counted(clock: C
     again = Review(clock)
     again.restore(json.loads(json.dumps(review.state())))
     assert again.missed == review.missed
+    review.take(key, False, "gen3")
+    clock.pass_days(1)
+    review.move(key, "gen3")
+    assert review.recalled(key, True, "gen3") == (0, 0, 0, 0), "it was about this arm when it was missed"
     for arm in "abcdefgh":
         review.move(key, arm)
     assert review.missed[key].before == ("g", "f", "e", "d"), "the last ones are kept"
@@ -145,13 +149,39 @@ def test_a_seat_counts_what_is_remembered(clock: Clock) -> None:
     one, missed = activity(), ALL.all[1]
     one.review = Review(clock)
     one.answer(missed, None, Verdict(False, "No."), 1.0)
-    seat = SimpleNamespace(submit=lambda judged: None, tell_recalled=heard.append)
+    seat = SimpleNamespace(submit=lambda _: None, tell_recalled=heard.append, give_up=lambda _: True)
     one.take_seat(ExerciseContext("seat room me", b"key", seat=True), seat)
     one.answer(missed, None, Verdict(False, "No."), 1.0)
     clock.pass_days(8)
-    one.answer(missed, None, Verdict(True, "Yes."), 1.0)
-    one.answer(missed, None, Verdict(False, "No."), 1.0)
+    one.take_exercise(missed, right=True, again=True)
+    one.take_exercise(missed, right=False, again=True)
     assert heard == [Recalled(1, 1, 0, 0)], "the first answer of the day counts"
+    for elsewhere in (
+        lambda: one.answer(missed, None, Verdict(False, "No."), 1.0),
+        lambda: one.give_up(missed, 1.0),
+        lambda: one.take_exercise(missed, right=False),  # as the check of a lesson does
+    ):
+        clock.pass_days(8)
+        assert keys(one.review.due) == [missed.id]
+        elsewhere()
+        assert one.review.due == []
+        assert len(heard) == 1, "what Review has not asked does not count"
+
+
+def test_a_seat_counts_questions_of_lessons_that_review_has_asked(clock: Clock) -> None:
+    heard: list[Recalled] = []
+    one = activity()
+    one.review = Review(clock)
+    seat = SimpleNamespace(submit=lambda judged: None, tell_recalled=heard.append)
+    one.take_seat(ExerciseContext("seat room me", b"key", seat=True), seat)
+    for question in ("c1", "c2"):
+        one.take_question("velocity", question, "ur5", right=False)
+    clock.pass_days(8)
+    one.question_again = question_key("velocity", "c2")
+    one.take_question("velocity", "c1", "ur5", right=True)
+    assert heard == []
+    one.take_question("velocity", "c2", "ur5", right=True)
+    assert heard == [Recalled(1, 1, 0, 0)]
 
 
 def test_a_long_list_keeps_what_is_known_least(clock: Clock) -> None:
