@@ -67,7 +67,7 @@ class Item:
         students: how many have answered it, or asked for the answer.
         first: how many of them were right at the first try.
         looked: how many asked for the answer.
-        seconds: the median time until the first answer; None: there is none.
+        seconds: the median time until the first answer, from when it was opened last; None: there is none.
         compared: how many students the discrimination is of.
         discrimination: None: fewer than `FEW`, or all alike.
         causes: those of the most students first, `MOST` at most.
