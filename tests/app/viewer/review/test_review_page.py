@@ -154,7 +154,7 @@ def test_a_question_of_a_lesson_comes_back_on_another_arm(server: int, clock: Si
         answer = question.right()
         assert question.asked().form == "fields"
         press(tab, "guide", "fields", QUESTION, value=question.cells(answer))
-        tab.wait(lambda: missed(tab) == {key: [1, TODAY + 4, robot.id]})
+        tab.wait(lambda: missed(tab) == {key: [1, TODAY + 4, robot.id, "ur5"]})
         tab.wait(lambda: "0 to answer today" in tab.html)
         press(tab, "review", "back")
         tab.wait(lambda: "Nothing today; 1 later, the first in 3 days." in tab.html)
