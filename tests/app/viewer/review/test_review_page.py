@@ -73,8 +73,24 @@ def row(tab: FakeBrowser) -> str:
     return html.unescape(found[-1]) if found else ""
 
 
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The keys of what was asked again, as far as answers count as remembered or not."""
+    found: list[str] = []
+    recalled = review.Review.recalled
+
+    def counting(self: review.Review, key: str, right: bool, robot: str = "") -> object:
+        found.append(key)
+        return recalled(self, key, right, robot)
+
+    monkeypatch.setattr(review.Review, "recalled", counting)
+    return found
+
+
 @pytest.mark.full
-def test_an_exercise_that_was_missed_comes_back_with_other_numbers(server: int, clock: SimpleNamespace) -> None:
+def test_an_exercise_that_was_missed_comes_back_with_other_numbers(
+    server: int, clock: SimpleNamespace, counted: list[str]
+) -> None:
     one = ALL.get("row-distance")
     assert one is not None
     practised = {"exercises": {"seed": 77, "at": "", "done": {}}}
@@ -111,6 +127,7 @@ def test_an_exercise_that_was_missed_comes_back_with_other_numbers(server: int, 
         assert one.variant(seed).text(one.text, Units()) in html.unescape(tab.html)
         press(tab, "review", "fields", value=[one.kind.answer(one.variant(seed))])
         tab.wait(lambda: missed(tab) == {one.id: [1, TODAY + 1 + 3]})
+        assert counted == [one.id], "once, in Review"
         assert kept(tab)["exercises"]["done"][one.id][:2] == [2, 2], "the list of exercises is as it was"
         assert "Other numbers" not in tab.html
         press(tab, "review", "list")
@@ -129,7 +146,9 @@ def _seed(tab: FakeBrowser, one: Exercise) -> int:
 
 
 @pytest.mark.full
-def test_a_question_of_a_lesson_comes_back_on_another_arm(server: int, clock: SimpleNamespace) -> None:
+def test_a_question_of_a_lesson_comes_back_on_another_arm(
+    server: int, clock: SimpleNamespace, counted: list[str]
+) -> None:
     key = f"velocity/{QUESTION}"
     with FakeBrowser(server, memory=memory(PageState("ur5", lesson="velocity"))) as tab:
         tab.wait(lambda: 'data-guide="steps"' in tab.html)
@@ -156,6 +175,7 @@ def test_a_question_of_a_lesson_comes_back_on_another_arm(server: int, clock: Si
         press(tab, "guide", "fields", QUESTION, value=question.cells(answer))
         tab.wait(lambda: missed(tab) == {key: [1, TODAY + 4, robot.id, "ur5"]})
         tab.wait(lambda: "0 to answer today" in tab.html)
+        assert counted == [key], "once, in Review"
         press(tab, "review", "back")
         tab.wait(lambda: "Nothing today; 1 later, the first in 3 days." in tab.html)
 
