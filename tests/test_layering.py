@@ -81,7 +81,7 @@ RULES: dict[str, set[str]] = {
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/mcp": {
         *("mcp", "fastapi", "pydantic_core", "starlette", "websockets", "kin"),
-        *("app.api", "app.live.client.connection", "app.mcp", "app.shared"),
+        *("app.api", "app.classroom.tokens", "app.live.client.connection", "app.mcp", "app.shared"),
     },
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},

@@ -22,6 +22,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from app.api.live.messages import LiveMessage
 from app.api.problems import ProblemError, invalid
+from app.classroom.tokens import read_code
 from app.live.client.connection import where
 from app.mcp.inside import scope_of
 from app.mcp.tools import Schema, closed
@@ -136,11 +137,14 @@ class Visit:
         self._timer = loop.call_later(IDLE, self.leave)
         self._count += 1
         number = self._count
-        subscription = {"subscribe": {"values": SHOWN, "rate": 10}} if number == 1 else {}
+        given = {name: value for name, value in fields.items() if value is not None}
         answer = self._answers[number] = loop.create_future()
         self._prepared = loop.time()
         try:
-            await self._socket.send(json.dumps({**fields, **subscription, "id": number}))
+            if number == 1:  # apart: a message that is refused subscribes to nothing
+                await self._socket.send(json.dumps({"subscribe": {"values": SHOWN, "rate": 10}}))
+            # With a value, if only an empty drawing: else it is done before the page has said what it shows.
+            await self._socket.send(json.dumps({"draw": {}, **given, "id": number}))
             while not answer.done():
                 left = self._prepared + ANSWER - loop.time()
                 if left <= 0.0:
@@ -211,6 +215,7 @@ class Pages:
 
     def __init__(self, dial: Dial) -> None:
         self._dial = dial
+        self._dialling = asyncio.Lock()  # or a second call would be refused as another program
         self._visits: dict[tuple[str, str], Visit] = {}
 
     async def drive(self, request: Request | None, name: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -225,10 +230,11 @@ class Pages:
             raise invalid(
                 FieldError(field=given, value=show(fields[given]), expected=f"one of {', '.join(FIELDS)}")
             )
-        key = code, name
-        if (visit := self._visits.get(key)) is None:
-            socket = await self._dial(request, code, name)
-            visit = self._visits[key] = Visit(socket, lambda: self._visits.pop(key, None))
+        key = read_code(code), name
+        async with self._dialling:
+            if (visit := self._visits.get(key)) is None:
+                socket = await self._dial(request, code, name)
+                visit = self._visits[key] = Visit(socket, lambda: self._visits.pop(key, None))
         return await visit.ask(fields)
 
     def close(self) -> None:

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 import httpx2
+import numpy as np
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
@@ -16,9 +17,10 @@ from mcp import Client
 from mcp.client.streamable_http import streamable_http_client
 
 import kin
+from app.classroom.tokens import show_code
 from app.live import Listener
 from app.mcp import page as page_module
-from app.mcp.page import FIELDS
+from app.mcp.page import FIELDS, Pages, inside
 from app.service.main import create_app
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -140,23 +142,23 @@ def test_only_messages_in_json_are_taken():
 
 
 class Page:
-    """Takes what its program sends, as a page's worker does, and shows it."""
+    """Takes what its program sends, as a page's worker does, and publishes what it shows before it says done."""
 
     def __init__(self, app: FastAPI) -> None:
         self.taken: dict[str, Any] = {}
+        self.q = kin.get_robot("ur5").q_home
         self.door = Listener(app.state.lines, self._post)
         self.door.open(kin.get_robot("ur5"))
         assert self.door.line is not None
         self.line = self.door.line
         self.code = self.line.code
-        self.line.publish("q", kin.get_robot("ur5").q_home)
 
     def _post(self, key: str, value: object) -> None:
         for pending in map(self.line.take, ("live", "drawn")):
             self.taken |= pending.values
-            if "q" in pending.values:
-                self.line.publish("q", pending.values["q"])
+            self.q = pending.values.get("q", self.q)
             for number in pending.numbers:
+                self.line.publish("q", self.q)
                 self.line.write(number)
 
 
@@ -183,6 +185,47 @@ def test_an_agent_drives_the_page_whose_code_it_has_under_its_name(app, mode):
     assert moved.structured_content["q"] == [0.1] * 6
     assert page.taken["q"].tolist() == [0.1] * 6
     assert names == (["mcp"] * 2 if mode == "auto" else ["An agent"] * 2)
+
+
+def test_the_code_alone_answers_with_what_the_page_shows_now(app):
+    page = Page(app)
+    for k in range(2):  # the second agent hears nothing of the time of the first
+        page.q = np.full(6, 0.1 * k)
+        found = run(app, lambda client: client.call_tool("drive_page", {"code": page.code, "draw": None}))
+        assert found.structured_content["q"] == page.q.tolist()
+
+
+def test_after_a_refusal_the_values_are_heard_still(app):
+    page = Page(app)
+
+    async def act(client: Client) -> list[Any]:
+        return [await client.call_tool("drive_page", {"code": page.code, "q": q}) for q in ([9.0] * 6, [0.1] * 6)]
+
+    refused, moved = run(app, act)
+    assert refused.is_error
+    assert moved.structured_content["q"] == [0.1] * 6
+
+
+def test_calls_at_a_time_and_other_spellings_of_the_code_are_one_connection(app):
+    page = Page(app)
+    dials: list[str] = []
+    dial = inside(app)
+
+    async def slowly(request: Any, code: str, name: str) -> Any:
+        dials.append(code)
+        await asyncio.sleep(0)
+        return await dial(request, code, name)
+
+    async def act() -> list[dict[str, Any]]:
+        pages = Pages(slowly)
+        spellings = page.code, show_code(page.code).lower(), f" {page.code} "
+        try:
+            return await asyncio.gather(*(pages.drive(None, "agent", {"code": code}) for code in spellings))
+        finally:
+            pages.close()
+
+    assert [shown["robot"]["id"] for shown in asyncio.run(act())] == ["ur5"] * 3
+    assert len(dials) == 1
 
 
 def test_it_leaves_when_it_says_nothing(app, monkeypatch):
