@@ -10,6 +10,7 @@ from typing import cast
 
 from app.classroom.views import ClassroomUnavailable, RefusedError, RoomView
 from app.viewer.feature import Feature, Stage
+from app.viewer.live.feature import Connect
 from app.viewer.panel import update_html
 from app.viewer.panel.part import Block
 from app.viewer.panel.status import Notice
@@ -45,6 +46,8 @@ def act_of(key: Hashable, value: object, features: Iterable[Feature | type[Featu
         return ""
     if name == "feature":
         match key, value:
+            case ("message", *_), [Connect.key, ["stop", *_], *_]:  # a frozen student may end a connection
+                return ""
             case ("message", *_), [pressed, *_]:
                 return name if all(feature.acts for feature in features if feature.key == pressed) else ""
         return ""

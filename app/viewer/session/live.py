@@ -37,6 +37,7 @@ class LiveInput:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._done: list[int] = []
+        self._plays = False  # whether the program of the tab plays because it was asked for here
         self.handlers: dict[str, Callable[[object], None]] = {"live": self._move, "drawn": self._draw}
         self._used: dict[str, Callable[[Any], None]] = {
             "robot": self._use_robot,
@@ -115,6 +116,7 @@ class LiveInput:
 
     def _play(self, on: bool) -> None:
         self._tab.start(on)
+        self._plays = on
 
     @property
     def _tab(self) -> ProgramTab:
@@ -142,8 +144,12 @@ class LiveInput:
     def publish(self, result: IKResult | None) -> None:
         """Let the program know what the page shows now; `result` is the last answer of inverse kinematics."""
         page, line = self._page, self._page.door.line
+        self._plays = self._plays and self._tab.settings.playing
         if line is None:
             self._done.clear()
+            if self._plays:  # the visitor has ended the connection, and so what it does
+                self._plays = False
+                self._tab.start(False)
             return
         line.use_robot(page.now.robot)
         if line.program is None:

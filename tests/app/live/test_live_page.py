@@ -35,6 +35,8 @@ Q = [0.3, -1.2, 1.4, -0.4, 0.5, 0.2]
 SPHERE = {"shape": "sphere", "xyz": [1.5, 0.0, 0.5], "radius": 0.1}
 MOVES = {"segments": [{"kind": "ptp", "q": Q}, {"kind": "ptp", "q": [0.5, -1.2, 1.4, -0.4, 0.5, 0.2]}]}
 
+SLOW = {"segments": [MOVES["segments"][0], {"kind": "dwell", "seconds": 60.0}, MOVES["segments"][1]]}
+
 
 class Program:
     """A program that is connected to a page."""
@@ -249,6 +251,26 @@ def test_stop_in_the_status_card_ends_the_connection(page, program):
     page.say("feature", ["connect", ["stop", 0], None])
     assert program.until("end")["reason"] == "The page has withdrawn the code."
     page.wait(lambda: 'data-guide-do="stop"' not in page.html)
+
+
+def test_stop_stops_the_program_that_the_connection_plays(page, program):
+    program.do(program=SLOW, play=True)
+    page.wait(lambda: 'data-playing="1"' in page.html)
+    page.say("feature", ["connect", ["stop", 0], None])
+    page.wait(lambda: 'data-playing="0"' in page.html)
+    assert program.until("end")
+
+
+def test_what_the_visitor_plays_goes_on_when_the_connection_ends(page, program):
+    program.do(program=SLOW, play=True)
+    for state in "01":
+        page.say("feature", ["program", ["play", int(state)], None])
+        page.wait(lambda state=state: f'data-playing="{state}"' in page.html)
+    page.say("feature", ["connect", ["stop", 0], None])
+    assert program.until("end")
+    number = page.say("feature", ["connect", ["stop", 0], None])  # a later step of the page
+    page.wait(lambda: page.script["reply"][0] >= number)
+    assert 'data-playing="1"' in page.html
 
 
 def test_a_withdrawn_code_ends_the_connection(page, program):

@@ -28,6 +28,7 @@ from app.classroom.standing import standing
 from app.classroom.work import ANSWER_SHOWN, Attempt, Work, works
 from app.exercises import Exercises
 from app.viewer.exercises.feature import Practising
+from app.viewer.live.feature import Connect
 from app.viewer.room import submissions, views
 from app.viewer.room.member import act_of
 from app.viewer.room.sharing import REST, Sharing
@@ -173,6 +174,8 @@ def test_no_half_of_an_outcome_of_an_answer_is_seen() -> None:
         (("message", "feature", 7), ["exercises", ["answer", 1], 0], "feature"),
         (("message", "feature", 7), ["class", ["hand", 1], None], ""),
         (("message", "feature", 7), ["sheet", ["page", 1], None], ""),
+        (("message", "feature", 7), ["connect", ["stop", 0], None], ""),
+        (("message", "feature", 7), ["connect", ["upload"], None], "feature"),
         (("message", "feature", 7), [], ""),
         (("message", "unknown", 7), None, ""),
         (("feature", "workspace", "chunk"), None, ""),
@@ -181,7 +184,7 @@ def test_no_half_of_an_outcome_of_an_answer_is_seen() -> None:
     ],
 )
 def test_acts_are_what_a_visitor_does_to_the_arm(key: object, value: object, act: str) -> None:
-    assert act_of(key, value, (Practising, Student, Worksheets)) == act  # type: ignore[arg-type]  # type: ignore[arg-type]
+    assert act_of(key, value, (Practising, Student, Worksheets, Connect)) == act
 
 
 def work(*scores: float | None, exercise: str = "swing", answer: str = "[1]") -> dict[str, Work]:
