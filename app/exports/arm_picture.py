@@ -86,7 +86,7 @@ def _ends(robot: Robot, q: Array) -> Array:
     bodies = capsules(robot)
     base = np.broadcast_to(robot.T_world_base, (len(q), 1, 4, 4))
     frames = np.concatenate([base, kin.link_frames(robot, q)], axis=1)[:, [body.row + 1 for body in bodies]]
-    axes = np.array([(body.start, body.end) for body in bodies])
+    axes = np.array([(body.start, body.end) for body in bodies]).reshape(-1, 2, 3)  # a wrist alone has no bodies
     found: Array = np.einsum("kmij,mej->kmei", frames[..., :3, :3], axes) + frames[:, :, None, :3, 3]
     return found
 

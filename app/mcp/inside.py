@@ -101,8 +101,14 @@ async def ask(
         raise
     except Exception:
         logger.exception("a tool failed")
-        return Reply(500, "application/problem+json", to_json(internal_error().problem))
+        return _failed()
     head, *parts = found
     kinds = [value.decode() for name, value in head["headers"] if name == b"content-type"]
     content = b"".join(part.get("body", b"") for part in parts)
+    if not content:  # the agent has left: nobody reads this
+        return _failed()
     return Reply(head["status"], (kinds or [""])[0].partition(";")[0], content)
+
+
+def _failed() -> Reply:
+    return Reply(500, "application/problem+json", to_json(internal_error().problem))

@@ -147,13 +147,12 @@ class _Handlers:
     async def read_resource(self, context: Context, params: ReadResourceRequestParams) -> ReadResourceResult:
         """The text of a resource; an error for one that there is not."""
         uri = params.uri
+        arm = uri[len(ARMS) + 1 :] if uri.startswith(f"{ARMS}/") else ""
         page = next((page for page in _pages() if uri == f"{DOCS}{page.stem}"), None)
         if page is not None:
             text, kind = page.read_text(encoding="utf-8"), MARKDOWN
-        elif uri == ARMS or uri.startswith(f"{ARMS}/"):
-            name, given = (
-                ("list_robots", {}) if uri == ARMS else ("describe_robot", {"robot": uri[len(ARMS) + 1 :]})
-            )
+        elif uri == ARMS or arm:
+            name, given = ("describe_robot", {"robot": arm}) if arm else ("list_robots", {})
             reply = await ask(self._service, context.request, *self.tools[name].request(given))
             if reply.status != 200:
                 raise MCPError(INVALID_PARAMS, from_json(reply.content)["detail"])

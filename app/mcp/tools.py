@@ -79,8 +79,12 @@ class Tool:
     answers: Schema | None
 
     def request(self, arguments: Mapping[str, Any]) -> tuple[str, str, dict[str, str], dict[str, Any] | None]:
-        """Method, path, query and body of the request; raises `ProblemError` for an arm that is none."""
-        given = {**self.defaults, **arguments}
+        """Method, path, query and body of the request; raises `ProblemError` for an arm that is none.
+
+        What stands in the address and is null is as if it were not given: there is no null in an address.
+        """
+        values = {name: value for name, value in arguments.items() if value is not None or name not in self.query}
+        given = {**self.defaults, **values}
         path = self.path
         if "{robot_id}" in path:
             robot = given.pop("robot", None)
@@ -89,12 +93,12 @@ class Tool:
                     name: _text(given.pop(name)) for name in self.query & given.keys() if self.method == "POST"
                 }
                 return "POST", self.sent, query, {"robot": robot, **given}
-            if not isinstance(robot, str):
+            if not isinstance(robot, str) or not robot:
                 expected = "the id of an arm" + ", or the fields of a robot file" * bool(self.sent)
                 raise invalid(FieldError(field="robot", value=show(robot), expected=expected))
             path = path.replace("{robot_id}", quote(robot, safe=""))
         if self.method == "GET":
-            return "GET", path, {name: _text(value) for name, value in given.items() if value is not None}, None
+            return "GET", path, {name: _text(value) for name, value in given.items()}, None
         query = {name: _text(given.pop(name)) for name in self.query & given.keys()}
         return self.method, path, query, given
 

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from mcp import Client, MCPError
 from PIL import Image
+from starlette.responses import Response
 
 from app.api.arms.description import EXAMPLE as TABLE
 from app.mcp import server as server_module
@@ -98,6 +99,14 @@ def test_an_arm_may_be_sent_along(agent):
     assert call(agent, "code", robot=TABLE, format="dh").content[0].text.startswith("id = ")
 
 
+@pytest.mark.parametrize("arm", ["ur5", TABLE])
+def test_null_is_what_is_not_given(agent, tools, arm):
+    target = {"position": [0.045, 0.191, -0.211]}
+    found = call(agent, "ik", robot=arm, target=target, task="position", fields=None)
+    assert not found.is_error, found.content
+    assert tools["list_robots"].request({"brief": None}) == tools["list_robots"].request({})
+
+
 @pytest.mark.parametrize(
     ("name", "arguments", "field", "words"),
     [
@@ -106,6 +115,7 @@ def test_an_arm_may_be_sent_along(agent):
         ("fk", {"robot": "ur6", "q": [0.0]}, "robot_id", "one of pioneer5"),
         ("fk", {"robot": "ur5/inspect", "q": [0.0]}, "robot_id", "one of pioneer5"),
         ("fk", {"q": [0.0]}, "robot", "the id of an arm, or the fields of a robot file"),
+        ("fk", {"robot": "", "q": [0.0]}, "robot", "the id of an arm, or the fields of a robot file"),
         ("fk", {"robot": {"rows": []}, "q": [0.0]}, "robot", ""),
         ("describe_robot", {"robot": TABLE}, "robot", "the id of an arm"),
         ("code", {"robot": "ur5", "format": "pdf"}, "format", "'toml'"),
@@ -163,6 +173,13 @@ def test_pictures_of_postures_and_motions_differ_and_have_the_size_that_was_aske
     assert len(images[0].getcolors(96 * 96) or ()) > 50
 
 
+def test_a_wrist_without_lengths_is_a_picture_too(agent):
+    rows = [{"name": f"axis {k}", "alpha": (90, -90, 0)[k], "limits": [-90, 90]} for k in range(3)]
+    wrist = {**TABLE, "rows": rows, "home": {"q": [10, 20, 30]}}
+    (content,) = call(agent, "picture", robot=wrist, size=64).content
+    assert Image.open(io.BytesIO(b64decode(content.data))).size == (64, 64)
+
+
 def test_resources_are_the_arms_and_the_pages_of_the_documentation(agent):
     async def read(client: Client) -> tuple[list[str], dict[str, str]]:
         uris = [each.uri for each in (await client.list_resources()).resources]
@@ -179,7 +196,11 @@ def test_resources_are_the_arms_and_the_pages_of_the_documentation(agent):
 
 
 @pytest.mark.parametrize(
-    "uri", ["kinboard://arms/ur6", "kinboard://docs/none", "kinboard://docs/../README", "file:///etc/passwd", "x"]
+    "uri",
+    [
+        *("kinboard://arms/", "kinboard://arms/ur6", "kinboard://docs/none", "kinboard://docs/../README"),
+        *("file:///etc/passwd", "x"),
+    ],
 )
 def test_there_are_no_other_resources(agent, uri):
     found = agent(lambda client: client.read_resource(uri))
@@ -207,6 +228,16 @@ def test_a_call_that_is_taken_back_ends_its_computation():
 
     asyncio.run(cancelled())
     assert heard == ["http.disconnect"]
+
+
+def test_an_empty_answer_of_rest_is_an_error_of_the_tool():
+    """As REST gives it, for the log, to an agent that has left."""
+
+    async def service(scope, receive, send):
+        await Response(status_code=499)(scope, receive, send)
+
+    reply = asyncio.run(ask(service, None, "GET", "/", {}, None))
+    assert server_module.result(reply).is_error
 
 
 def test_the_schema_of_a_page_has_no_fields_of_real_machines():
