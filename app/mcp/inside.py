@@ -18,7 +18,8 @@ from app.api.problems import internal_error
 
 logger = logging.getLogger("kinboard.mcp")
 
-HEADERS = [(b"host", b"localhost"), (b"content-type", b"application/json")]
+# An address is no name that a service could refuse.
+HEADERS = [(b"host", b"127.0.0.1"), (b"content-type", b"application/json")]
 # Of a caller on this machine, who has no request of its own: standard input and output.
 ALONE: Scope = {
     "asgi": {"version": "3.0"},

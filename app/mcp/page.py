@@ -18,7 +18,7 @@ from pydantic_core import from_json
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message
 from websockets.asyncio.client import connect
-from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
 
 from app.api.live.messages import LiveMessage
 from app.api.problems import ProblemError, invalid
@@ -27,6 +27,7 @@ from app.live.client.connection import where
 from app.mcp.inside import scope_of
 from app.mcp.tools import Schema, closed
 from app.shared.problems import FieldError, Problem, show
+from kin import KinematicsError
 
 IDLE: Final = 120.0  # s
 ANSWER: Final = 20.0  # s for an answer of the page, or a sign that it compiles what it needs
@@ -45,6 +46,7 @@ KNOWN: Final = {
     "ObstacleBody": {"type": "object", "description": "An obstacle as `ik` takes it."},
 }
 ENDED: Final = "Ask the person for the code that the page shows now."
+NOT_LET_IN: Final = "Set KINBOARD_TOKEN to its access token, if it has one; else its log says why."
 NOT_THERE: Final = "Start the service, or name its address: kinboard mcp --url URL."
 
 
@@ -106,10 +108,13 @@ def at(url: str, token: str | None) -> Dial:
     """Dials pages of the service with this address."""
 
     async def dial(_: Request | None, code: str, name: str) -> Socket:
-        address, options = where(url, code, name, token)
         try:
+            address, options = where(url, code, name, token)
             return await connect(address, **options)
-        except (OSError, InvalidHandshake, TimeoutError) as error:
+        except InvalidStatus as error:
+            detail = f"The service at {url} refused the connection with {error.response.status_code}."
+            raise ProblemError(403, "not-allowed", detail, NOT_LET_IN) from None
+        except (OSError, WebSocketException, KinematicsError) as error:
             detail = f"No connection to {url}: {error}."
             raise ProblemError(404, "not-running", detail, NOT_THERE) from None
 

@@ -206,7 +206,7 @@ class Settings(BaseSettings):
         return values
 
     def on_this_machine(self) -> Settings:
-        """These settings for one process on a free port that only this machine reaches, without a token."""
+        """These settings for one process on a free port that only this machine reaches: no token, no rates."""
         return self.model_copy(
             update={
                 "host": "127.0.0.1",
@@ -214,6 +214,7 @@ class Settings(BaseSettings):
                 "compute": 0,
                 "token": None,
                 "read_only": False,
+                "rate_limit": 0.0,
                 "root_path": "",
             }
         )

@@ -13,14 +13,17 @@ import pytest
 from mcp import Client, MCPError
 from PIL import Image
 from starlette.responses import Response
+from websockets.asyncio.server import serve
 
 from app.api.arms.description import EXAMPLE as TABLE
 from app.mcp import server as server_module
 from app.mcp.inside import ask
-from app.mcp.page import FIELDS, Pages, inside
+from app.mcp.page import FIELDS, Pages, at, inside
 from app.mcp.server import DRIVE, agent_server
 from app.mcp.tools import EXAMPLE, TOOLS, Tool, tools_of
-from app.shared.settings import docs_folder
+from app.service.main import create_app
+from app.shared.settings import Settings, docs_folder
+from app.shared.store import Store
 
 URDF = (docs_folder().parent / "tests/data/urdf/ur5.urdf").read_text(encoding="utf-8")
 REACHED = {"position": [0.4, 0.1, 0.3], "wxyz": [0.0, 1.0, 0.0, 0.0]}
@@ -238,6 +241,41 @@ def test_an_empty_answer_of_rest_is_an_error_of_the_tool():
 
     reply = asyncio.run(ask(service, None, "GET", "/", {}, None))
     assert server_module.result(reply).is_error
+
+
+def test_settings_of_a_service_refuse_nothing_to_an_agent_on_this_machine():
+    settings = Settings(allowed_hosts=("kinboard.example",), rate_limit=0.1, compute=0).on_this_machine()
+    app = create_app(settings, Store())
+
+    async def acting():
+        async with Client(agent_server(app, app, Pages(inside(app)))) as client:
+            return [await client.call_tool("fk", {"robot": "ur5", "q": [0.0] * 6}) for _ in range(3)]
+
+    assert [found.structured_content["pose"]["frame"] for found in asyncio.run(acting())] == ["world"] * 3
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("ftp://127.0.0.1", "address: got 'ftp://127.0.0.1', expected the service's, such as http://localhost"),
+        ("http://127.0.0.1:{}", "refused the connection with 403. Set KINBOARD_TOKEN to its access token"),
+        ("http://127.0.0.1:1", "Start the service, or name its address"),
+    ],
+)
+def test_why_a_page_cannot_be_reached_is_said(app, url, words):
+    def refuse(connection, _):
+        return connection.respond(403, "")
+
+    async def acting():
+        async with serve(pytest.fail, "127.0.0.1", 0, process_request=refuse) as server:
+            (socket,) = server.sockets
+            pages = Pages(at(url.format(socket.getsockname()[1]), None))
+            async with Client(agent_server(app, app, pages)) as client:
+                return await client.call_tool(DRIVE, {"code": "K7QF-2M4A"})
+
+    found = asyncio.run(acting())
+    assert found.is_error
+    assert words in found.content[0].text
 
 
 def test_the_schema_of_a_page_has_no_fields_of_real_machines():
