@@ -153,6 +153,7 @@ class _Handlers:
             text, kind = page.read_text(encoding="utf-8"), MARKDOWN
         elif uri == ARMS or arm:
             name, given = ("describe_robot", {"robot": arm}) if arm else ("list_robots", {})
+            await self.list_tools(context, None)  # made by a thread
             reply = await ask(self._service, context.request, *self.tools[name].request(given))
             if reply.status != 200:
                 raise MCPError(INVALID_PARAMS, from_json(reply.content)["detail"])
@@ -202,6 +203,7 @@ def agent_server(app: FastAPI, service: ASGIApp, pages: Pages) -> Server[Any]:
         version=__version__,
         title="Kinboard",
         instructions=INSTRUCTIONS.format(app.description),
+        get_tool_input_schema=lambda _: None,  # no argument comes as a header; else each call lists all tools
         on_list_tools=handlers.list_tools,
         on_call_tool=handlers.call_tool,
         on_list_resources=handlers.list_resources,

@@ -76,6 +76,26 @@ def test_a_client_gets_answers_over_http(mode):
     assert frame == "world"
 
 
+def test_a_call_lists_the_tools_once(monkeypatch):
+    """For their names; the SDK has no need of their schemas."""
+    listed: list[object] = []
+
+    async def counted(make: Callable[[], Any]) -> Any:
+        listed.append(make)
+        return make()
+
+    monkeypatch.setattr("app.mcp.server.run_in_threadpool", counted)
+
+    async def act(client: Client) -> int:
+        counts = []
+        for _ in range(2):
+            await client.call_tool("fk", {"robot": "ur5", "q": [0.0] * 6})
+            counts.append(len(listed))
+        return counts[1] - counts[0]
+
+    assert run(service(), act) == 1
+
+
 def test_it_is_off_by_default():
     assert Settings().mcp is False
     app = create_app(Settings(), STORE)

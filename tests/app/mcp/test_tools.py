@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import json
+import threading
 from base64 import b64decode
 from collections.abc import Mapping
 from typing import Any
@@ -276,6 +277,16 @@ def test_why_a_page_cannot_be_reached_is_said(app, url, words):
     found = asyncio.run(acting())
     assert found.is_error
     assert words in found.content[0].text
+
+
+def test_the_document_is_made_by_a_thread(agent, app, monkeypatch):
+    """It takes half a second, for which the event loop would answer nobody."""
+    made: list[bool] = []
+    document = app.openapi()
+    loop = threading.get_ident()
+    monkeypatch.setattr(app, "openapi", lambda: made.append(threading.get_ident() != loop) or document)
+    agent(lambda client: client.read_resource("kinboard://arms"))
+    assert made == [True]
 
 
 def test_the_schema_of_a_page_has_no_fields_of_real_machines():
