@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -76,9 +75,8 @@ async def ask(
 ) -> Reply:
     """What `service` answers. A computation ends when the agent leaves or takes the call back."""
     scope = {**scope_of(request, "http", path, query), "method": method}
-    waiting: list[Message] = [
-        {"type": "http.request", "body": b"" if body is None else json.dumps(body).encode(), "more_body": False}
-    ]
+    content = b"" if body is None else to_json(body, inf_nan_mode="constants")
+    waiting: list[Message] = [{"type": "http.request", "body": content, "more_body": False}]
     left = asyncio.Event()
     found: list[Message] = []
 
