@@ -21,7 +21,7 @@ from app.viewer.activity.context import LABEL
 
 INTERVALS: Final = (1, 3, 7)  # days
 MOST_MISSED: Final = 60  # in a list
-MOST_ARMS: Final = 4  # that are known of a question, beside the present one
+MOST_ARMS: Final = 4  # in `Missed.before`
 FARTHEST_ZONE: Final = 14 * 60  # minutes from UTC
 _DAY = 86_400  # s
 _LATEST = 10**6  # day
@@ -43,7 +43,8 @@ class Missed:
         stage: how often it was right since, on days when it was due.
         due: the day from which it is asked again, counted from 1 January 1970.
         robot: the id of the arm that the question of a lesson is about.
-        before: the ids of the arms that it was about before, the last first, `MOST_ARMS` at most.
+        before: the ids of the arms that it was about before, the last first, and of the present one once it was
+            answered, `MOST_ARMS` at most; empty as long as it was about one arm alone.
     """
 
     key: str
@@ -121,6 +122,8 @@ class Review:
             del self.missed[key]
             self._done.add((self._label, key))
             return True
+        if robot and new.before:
+            new = replace(new, before=tuple(dict.fromkeys((robot, *new.before)))[:MOST_ARMS])
         self.missed[key] = new
         if len(self.missed) > MOST_MISSED:  # what is known best goes first
             others = [one for one in self.missed.values() if one.key != key]

@@ -127,7 +127,7 @@ def test_what_is_remembered_after_a_week_and_about_a_new_arm_is_counted(clock: C
     assert review.recalled(key, True, "panda") == (0, 0, 1, 1)
     review.take(key, True, "panda")
     clock.pass_days(7)  # it was due after three
-    assert review.recalled(key, False, "panda") == (1, 0, 1, 0)
+    assert review.recalled(key, False, "panda") == (1, 0, 0, 0), "it was answered about this arm"
     review.move(key, "ur5")
     assert review.recalled(key, True, "ur5") == (1, 1, 0, 0), "this arm was the first one"
     again = Review(clock)
@@ -141,7 +141,10 @@ def test_what_is_remembered_after_a_week_and_about_a_new_arm_is_counted(clock: C
         review.move(key, arm)
     assert review.missed[key].before == ("g", "f", "e", "d"), "the last ones are kept"
     review.take(key, False, "z")
-    assert review.missed[key].before == ("h", "g", "f", "e")
+    assert review.missed[key].before == ("z", "h", "g", "f"), "with the one that it was answered about"
+    assert review.recalled(key, True, "z") is None
+    clock.pass_days(1)
+    assert review.recalled(key, True, "z") == (0, 0, 0, 0)
 
 
 def test_a_seat_counts_what_is_remembered(clock: Clock) -> None:

@@ -173,7 +173,7 @@ def test_a_question_of_a_lesson_comes_back_on_another_arm(
         answer = question.right()
         assert question.asked().form == "fields"
         press(tab, "guide", "fields", QUESTION, value=question.cells(answer))
-        tab.wait(lambda: missed(tab) == {key: [1, TODAY + 4, robot.id, "ur5"]})
+        tab.wait(lambda: missed(tab) == {key: [1, TODAY + 4, robot.id, robot.id, "ur5"]})
         tab.wait(lambda: "0 to answer today" in tab.html)
         assert counted == [key], "once, in Review"
         press(tab, "review", "back")
