@@ -174,7 +174,6 @@ class Number(Spec):
         marks: whether the ends below the slider are written by us: viser writes a hyphen for a minus.
         named: whether the label ends with the unit.
         rate: in a form, whether it is per second.
-        above: in a form, whether the lower limit itself is not valid.
         empty, nothing: what an empty field of a form means, and its value; "": it must not be empty.
     """
 
@@ -190,7 +189,6 @@ class Number(Spec):
     marks: bool = False
     named: bool = True
     rate: bool = False
-    above: bool = False
     empty: str = ""
     nothing: float | None = None
     within: Callable[[Robot], tuple[float, float]] | None = None
@@ -271,15 +269,15 @@ class Number(Spec):
         given = text.replace("/s", "") if self.rate else text
         if self.empty and not given.strip():
             return self.nothing
-        first, last = unit.short(low), unit.short(high)
-        valid = f"above {first}, at most {last}" if self.above else f"{first} to {last}"
+        small = 0.0 < low * unit.scale < unit.step(1)  # which would be written as 0
+        valid = f"{unit.short(low, _DECIMALS if small else 1)} to {unit.short(high)}"
         valid += unit.suffix.rstrip() + "/s" * self.rate + f", or nothing: {self.empty}" * bool(self.empty)
         valid = "a whole number from " * self.whole + valid
         try:
             value = read(given, unit, self.limits)
         except ReadError as error:
             raise EntryError(title, f"{error.sentence} Valid: {valid}.", error.readings) from None
-        if low <= value <= high and not (self.above and value == low) and not (self.whole and value % 1.0):
+        if low <= value <= high and not (self.whole and value % 1.0):
             return int(value) if self.whole else value
         raise EntryError(title, f"“{cut(text)}” is not valid. Valid: {valid}.")
 

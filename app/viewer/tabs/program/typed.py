@@ -22,7 +22,8 @@ from kin.transforms import Array
 from kin.typed import EntryError
 from kin.units import Units
 
-SLOWEST, FARTHEST, FASTEST = 0.01, 1000.0, 1000.0  # of the limits; m; m/s or rad/s
+SLOWEST, FARTHEST = 0.01, 1000.0  # of the limits; m
+LEAST, FASTEST = 1e-7, 1000.0  # m/s or rad/s
 EXACT = 12  # digits of a typed joint value
 # By the fields of segments: a row has those of its class.
 NUMBERS = {
@@ -46,22 +47,20 @@ NUMBERS = {
     ),
     "tool_speed": Number(
         label="Tool speed ≤",
-        limits=(0.0, FASTEST),
+        limits=(LEAST, FASTEST),
         measure="length",
         hint="Largest speed of the tool point, for a process such as welding, or for safety beside people. Empty: "
         "only the joints limit it",
         rate=True,
-        above=True,
         empty="no limit",
     ),
     "tool_turn": Number(
         label="Tool turn ≤",
-        limits=(0.0, FASTEST),
+        limits=(LEAST, FASTEST),
         measure="angle",
         hint="Largest angular velocity of the tool, for example so that a full cup does not spill. Empty: only "
         "the joints limit it",
         rate=True,
-        above=True,
         empty="no limit",
     ),
 }

@@ -276,6 +276,7 @@ def test_typed_joint_values_and_poses_are_exact() -> None:
         ("tool_speed", "x"),
         ("tool_speed", "0"),
         ("tool_turn", "0"),
+        ("tool_turn", "-1"),
         ("tool_speed", "inf"),
         ("acceleration", "0"),
     ],
@@ -289,11 +290,14 @@ def test_what_cannot_be_read_is_refused(field: str, text: str) -> None:
             FIELDS.read("colour", text, other, Q)
 
 
-def test_a_limit_of_zero_is_refused_with_what_would_be_valid() -> None:
-    for field, most in (("tool_speed", "1000000 mm/s"), ("tool_turn", "57295.8°/s")):
+@pytest.mark.parametrize("text", ["0", "1e-200"])
+def test_a_limit_of_no_speed_is_refused_with_what_would_be_valid(text: str) -> None:
+    for field, valid in (("tool_speed", "0.0001 to 1000000 mm/s"), ("tool_turn", "0.000006 to 57295.8°/s")):
         with pytest.raises(EntryError) as caught:
-            FIELDS.read(field, "0", ROWS[0], Q)
-        assert caught.value.detail == f"“0” is not valid. Valid: above 0, at most {most}, or nothing: no limit."
+            FIELDS.read(field, text, ROWS[0], Q)
+        assert caught.value.detail == f"“{text}” is not valid. Valid: {valid}, or nothing: no limit."
+        least = getattr(FIELDS.read(field, valid.split()[0], ROWS[0], Q), field)
+        assert least == pytest.approx(1e-7, rel=0.05)
 
 
 CURVE = tuple(UR5.clip(UR5.q_home + 0.1 * k * np.array([1, 1, -1, 1, 0, 0])) for k in range(5))
