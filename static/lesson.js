@@ -55,7 +55,7 @@
   async function upload(input) {
     const file = input.files[0];
     input.value = "";
-    if (file) send(input, "upload", [file.name, file.size > Number(input.dataset.most) ? "" : await file.text()]);
+    if (file) send(input, "upload", [file.name, file.size > Number(input.dataset.most) ? null : await file.text()]);
   }
   addEventListener("keydown", (event) => {
     if (event.key === "Enter" && event.target.matches?.("input[data-guide-change]")) event.target.blur();

@@ -75,11 +75,16 @@
     }
   }
 
+  /** Open the tab of a kind of file: it is that of the page after a reload, too. */
+  function openTabOf({ tab }) {
+    if (viserPage.openTab(tab)) dispatchEvent(new CustomEvent("kinboard-tab", { detail: tab }));
+  }
+
   /** Send files to where they belong, and open that tab: it says how far they are, and asks where it must. */
   async function open(files, usual) {
     const signal = begin();
     if (files.length > 1) {
-      viserPage.openTab(KINDS.zip.tab);
+      openTabOf(KINDS.zip);
       const wanted = files.filter(([path]) => WANTED.test(path) && !HIDDEN.test(path));
       const roots = new Set(files.map(([path]) => path.split("/")[0]));
       const name = roots.size === 1 ? [...roots][0] : (wanted.find(([path]) => /\.urdf$/i.test(path)) ?? files[0])[0].split("/").pop();
@@ -89,8 +94,8 @@
     const [[path, file]] = files;
     const name = path.split("/").pop().slice(0, 100);
     const kind = await kindOf(name, file, usual);
-    const { tab, most } = KINDS[kind];
-    viserPage.openTab(tab);
+    const { most } = KINDS[kind];
+    openTabOf(KINDS[kind]);
     if (kind === "recording") shown = null;
     if (["zip", "recording", "arm"].includes(kind)) sendFile(KINDS[kind], name, file, signal);
     else send(KINDS[kind], [name, file.size > most ? null : await file.text()]);

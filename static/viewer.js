@@ -105,7 +105,9 @@
   for (const [kind, then] of [["state", add], ["state-replace", show], ["state-return", goBack]]) {
     channel.on(kind, (value) => { state = value; keep(STATE, state); then(); });
   }
-  channel.on("tab", (title) => viserPage.openTab(title)); // of a command of the palette
+  channel.on("tab", (title) => { // of a command of the palette
+    if (viserPage.openTab(title)) dispatchEvent(new CustomEvent("kinboard-tab", { detail: title }));
+  });
   channel.on("state-last", leave); // the same state, for the next page of this browser
 
   // The controls appear some time after the state was requested, with the first tab open.

@@ -379,6 +379,8 @@ def test_a_link_with_an_unknown_exercise_says_so(server: int) -> None:
         press(tab, "course", ["go", 1], 99)
         press(tab, "course", ["upload", 2], 7)
         tab.wait(lambda: "the name and the text of a file" in shown(tab))
+        press(tab, "course", ["upload", 3], ["a.toml", None])
+        tab.wait(lambda: "a file of at most 16 kB" in shown(tab))
 
 
 def test_courses_that_nobody_opens_make_no_database(tmp_path: Path) -> None:

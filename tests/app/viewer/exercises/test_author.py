@@ -129,7 +129,9 @@ def test_hostile_messages_and_files_change_nothing(server: int) -> None:
             (["upload", 10], ["a.toml", "[" * 5000]),
         ):
             press(tab, key, value)
-        press(tab, ["set", "title", 11], "Still here")
+        press(tab, ["upload", 11], ["a.toml", None])
+        tab.wait(lambda: f"a file of at most {MOST_BYTES // 1000} kB" in shown(tab))
+        press(tab, ["set", "title", 12], "Still here")
         tab.wait(lambda: 'value="Still here"' in tab.html)
     for junk in (
         "x" * (MOST_BYTES + 100),
