@@ -168,6 +168,9 @@ class Stage(Protocol):
     def show_all(self) -> None:
         """Show again what `show_alone` has hidden."""
 
+    def open_choice(self, title: str) -> None:
+        """Open another choice of the tab *Learn*, in the same step for undo."""
+
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         """Show the joint sliders in this folder as well; None: in the tab Move only."""
 

@@ -146,7 +146,6 @@ class CourseFeature(Feature):
             case "go", int():
                 self._go(progress.go(value))
             case "recall", _ if rest and rest[0] in progress.back:
-                self.stage.post("lesson", "Review")
                 self.stage.post(("feature", REVIEW, ("open", str(rest[0]), 0)), None)
             case "fields", [[str(text)]]:
                 self._take(rest[0], text)
@@ -182,7 +181,6 @@ class CourseFeature(Feature):
         """Show an item: its lesson or exercise opens after this event."""
         stage = self.stage
         if item.kind == "exercise":
-            stage.post("lesson", "Exercises")
             stage.post(("feature", EXERCISES, ("open", item.key, 0)), None)
             return
         if item.robot and stage.now.robot.id != item.robot:

@@ -296,7 +296,6 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         """Open it as a student sees it, with new marks."""
         self._offer()
         self.stage.activity.practice.records.pop(exercise.id, None)
-        self.stage.post("lesson", "Exercises")
         self.stage.post(("feature", EXERCISES, ("open", exercise.id, 0)), None)
 
     def _bring(self, exercise: Exercise) -> None:

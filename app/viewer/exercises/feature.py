@@ -87,17 +87,22 @@ class Practising(Feature):
         return self._box is not None
 
     def open(self, exercise_id: object) -> None:
-        """Show an exercise; raises `kin.InputError` for one that does not exist."""
+        """Show an exercise, and no other one on the way; raises `kin.InputError` for one that does not exist."""
         self._practice.open(exercise_id)
-        if self.shown:
-            self._begin(self._now)
-            self._update()
+        if not self.shown:
+            self.stage.open_choice(self.title)
+            return
+        self._begin(self._now)
+        self._update()
 
     # Events
 
     def handle(self, key: Hashable, value: object) -> None:
         if not self.shown:
-            return  # a late click on what has been removed
+            match key:
+                case ("open", str(exercise_id), int()):  # from elsewhere
+                    self.open(exercise_id)
+            return  # others are late clicks on what has been removed
         match key:
             case ("drag", _, int()) if isinstance(value, DragEvent):
                 self._sheet.drag(pose_from_position_wxyz(value.position, value.wxyz), self.stage.units)

@@ -72,11 +72,7 @@ class Reviewing(Practising):
         if exercise is None:
             raise InputError("review", exercise_id, "a row of the list")
         self._draw_numbers(exercise)
-        if self.shown:
-            super().open(exercise_id)
-        else:
-            self._practice.open(exercise_id)
-            self.stage.post("lesson", self.title)
+        super().open(exercise_id)
 
     def _draw_numbers(self, exercise: Exercise) -> None:
         """Other numbers than those of the list of exercises."""

@@ -51,7 +51,7 @@ from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.live import LiveInput
 from app.viewer.session.looks import Looks
 from app.viewer.session.numbers import Numbers
-from app.viewer.session.palette import commands, offer
+from app.viewer.session.palette import Palette
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
 from app.viewer.session.preparing import Preparing
@@ -128,6 +128,7 @@ class VisitorPage(ShownArm, Worker):
         self._result: IKResult | None = None  # for the last target
         self._legend = ""
         self._alone: SceneFilter | None = None  # before all but what is shown alone
+        self._palette: Palette | None = None
         # Created by the worker when it builds the page.
         self.camera: VisitorCamera
         self.posture: PosturePanel
@@ -220,6 +221,9 @@ class VisitorPage(ShownArm, Worker):
     def show_driven(self, name: str) -> None:
         self.driven = name
         self.channel.show("driven", name)
+
+    def open_choice(self, title: str) -> None:
+        self.lessons.choose(title)
 
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         self._more_joints = folder
@@ -400,6 +404,8 @@ class VisitorPage(ShownArm, Worker):
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
                 self.status.fail(next((feature.failure for feature in self.features if feature.failure), ""))
                 self.status.offer("".join(feature.offer for feature in self.features))
+                if batch:
+                    self._renew_palette()
             if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
                 self._save()  # in the same frame, so that nothing is on show that a reload would lose
             self.live.publish(self._result)
@@ -507,9 +513,13 @@ class VisitorPage(ShownArm, Worker):
             self.channel.show("history", ["", ""])
             self.channel.show("driven", self.driven)
             if not (self._looking or self._persistence.embedded):
-                names, exercises = self.panel.robots.names, self.activity.exercises.all
-                offer(gui, commands(self.offered, self.features, names, exercises), self.post, self.channel)
+                self._palette = Palette(gui, self.offered, self.post, self.channel)
+                self._renew_palette()
         self.client.flush()
+
+    def _renew_palette(self) -> None:
+        if self._palette is not None:
+            self._palette.renew(self.features, self.panel.robots.names, self.activity.exercises.all)
 
     def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""

@@ -1,7 +1,8 @@
 """The command palette of viser (Ctrl+K): tabs, lessons, exercises, arms, views, actions and exports by typing.
 
-The list is made of the registries that the panel shows. A command posts the events that the controls post, so that
-undo, rooms, what is withheld and the limits of a class treat it as these; it opens the tab where its effect is.
+The list is made of the registries that the panel shows, and follows them: own arms and exercises come and go. A
+command posts the events that the controls post, so that undo, rooms, what is withheld and the limits of a class
+treat it as these; it opens the tab where its effect is.
 """
 
 from __future__ import annotations
@@ -67,8 +68,8 @@ def commands(
         label = f"Lesson: {choice.title}" if issubclass(choice, Lesson) else choice.title
         yield Command(label, choice.about, (("lesson", choice.title),), LEARN)
     for each in exercises:
-        begin = ("lesson", Practising.title), _pressed(Practising.key, ("open", each.id, 0), None)
-        yield Command(f"Exercise: {each.title}", each.topic, begin, LEARN)
+        begin = _pressed(Practising.key, ("open", each.id, 0), None)
+        yield Command(f"Exercise: {each.title}", each.topic, (begin,), LEARN)
     yield from (Command(f"Arm: {name}", "", (("robot", name),)) for name in arms)
     yield from (Command(f"Look from: {side}", "View", ((("look-from", side), None),)) for side in SIDES)
     yield from (Command(label, key, ((event, None),)) for event, label, key in ACTIONS)
@@ -79,21 +80,42 @@ def commands(
 
 def _pressed(feature: str, key: tuple[str | int, ...], value: object) -> tuple[Hashable, object]:
     """The message of the page's script when a button of a feature is pressed, as an event."""
-    return ("message", "feature", 0), [feature, list(key), value]
+    return ("message", "feature", 0), (feature, key, value)
 
 
-def offer(gui: viser.GuiApi, found: Iterator[Command], post: Post, channel: Channel) -> None:
-    """Register the commands."""
-    for command in found:
-        _register(gui, command, post, channel)
+class Palette:
+    """The commands that one page has registered.
 
+    Args:
+        tabs: of the page, as in `commands`.
+    """
 
-def _register(gui: viser.GuiApi, command: Command, post: Post, channel: Channel) -> None:
-    handle = gui.add_command(command.label, description=command.about or None)
+    def __init__(self, gui: viser.GuiApi, tabs: Sequence[type[Feature]], post: Post, channel: Channel) -> None:
+        self._gui, self._tabs, self._post, self._channel = gui, tabs, post, channel
+        self._handles: dict[Command, viser.CommandHandle] = {}
+        self._arms: Sequence[str] = ()
+        self._exercises: Sequence[Exercise] = ()
 
-    @handle.on_trigger
-    async def _(_: viser.CommandEvent) -> None:
-        if command.tab:
-            channel.notify("tab", command.tab)
-        for key, value in command.events:
-            post(key, value)
+    def renew(self, features: Sequence[Feature], arms: Sequence[str], exercises: Sequence[Exercise]) -> None:
+        """Register what there is by now, and remove what is gone; arguments as in `commands`."""
+        if arms == self._arms and exercises is self._exercises:
+            return
+        self._arms, self._exercises = arms, exercises
+        found = dict.fromkeys(commands(self._tabs, features, arms, exercises))
+        for command in [each for each in self._handles if each not in found]:
+            self._handles.pop(command).remove()
+        for command in found:
+            if command not in self._handles:
+                self._handles[command] = self._register(command)
+
+    def _register(self, command: Command) -> viser.CommandHandle:
+        handle = self._gui.add_command(command.label, description=command.about or None)
+
+        @handle.on_trigger
+        async def _(_: viser.CommandEvent) -> None:
+            if command.tab:
+                self._channel.notify("tab", command.tab)
+            for key, value in command.events:
+                self._post(key, value)
+
+        return handle

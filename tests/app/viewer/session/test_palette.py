@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from fake_browser import FakeBrowser
@@ -13,7 +16,7 @@ from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.events import MESSAGES, RULES
-from app.viewer.session.palette import ACTIONS, commands
+from app.viewer.session.palette import ACTIONS, Palette, commands
 from app.viewer.tabs import TABS
 from app.viewer.tabs.program.views import MOTIONS
 from app.viewer.tabs.robot.files import KINDS
@@ -27,7 +30,13 @@ def page(port) -> Iterator[FakeBrowser]:
 
 def registered(page: FakeBrowser) -> dict[str, str]:
     """The ids of the commands by their labels."""
-    return {m["props"]["label"]: m["uuid"] for m in page.log if m["type"] == "RegisterCommandMessage"}
+    found: dict[str, str] = {}
+    for m in page.log:
+        if m["type"] == "RegisterCommandMessage":
+            found[m["uuid"]] = m["props"]["label"]
+        elif m["type"] == "RemoveCommandMessage":
+            del found[m["uuid"]]
+    return {label: uuid for uuid, label in found.items()}
 
 
 def run(page: FakeBrowser, label: str) -> None:
@@ -73,6 +82,50 @@ def test_commands_do_what_the_controls_do(page):
     page.wait(lambda: page.value("Lesson") == LESSONS[0].title)
     run(page, "Save the arm as URDF")
     page.wait(lambda: any(m["type"].startswith("FileTransferStart") for m in page.log))
+
+
+def test_an_exercise_is_opened_in_one_step_and_no_other_one_on_the_way(port):
+    first, other = builtin_exercises()[:2]
+    with FakeBrowser(port) as page:
+        run(page, f"Exercise: {first.title}")
+        page.wait(lambda: f'data-exercise="{first.id}"' in page.html)
+        run(page, f"Lesson: {LESSONS[0].title}")
+        page.wait(lambda: page.value("Lesson") == LESSONS[0].title and page.script["undo"] == "Lesson")
+        run(page, f"Exercise: {other.title}")
+        page.wait(lambda: f'data-exercise="{other.id}"' in page.html and page.script["undo"] == "Exercise")
+        run(page, "Undo")
+        page.wait(lambda: page.script["redo"] == "Exercise")
+        page.wait(lambda: page.value("Lesson") == LESSONS[0].title)
+
+
+def test_an_own_arm_is_found_while_there_is_one(port):
+    with FakeBrowser(port) as page:
+        page.settle()
+        before = set(registered(page))
+        page.say("feature", ["robot", ["start"], "planar-2r"])
+        page.wait(lambda: "My arm" in page.value("Robot"))
+        mine = f"Arm: {page.value('Robot')}"
+        page.wait(lambda: set(registered(page)) == before | {mine})
+        page.say("feature", ["robot", ["delete"], None])
+        page.wait(lambda: set(registered(page)) == before)
+        page.say("undo")
+        page.wait(lambda: set(registered(page)) == before | {mine})
+
+
+def test_exercises_that_come_and_go_are_renewed_and_others_stay():
+    there: dict[str, int] = {}  # how often each was registered
+
+    def add_command(label: str, description: str | None) -> SimpleNamespace:
+        there[label] = there.get(label, 0) + 1
+        return SimpleNamespace(on_trigger=lambda act: act, remove=lambda: there.pop(label))
+
+    first, other, last = builtin_exercises()[:3]
+    palette = Palette(cast(Any, SimpleNamespace(add_command=add_command)), TABS, cast(Any, None), cast(Any, None))
+    palette.renew((), ("A",), (first, other))
+    palette.renew((), ("A",), (replace(first, topic="Another topic"), last))
+    exercises = {label for label in there if label.startswith("Exercise: ")}
+    assert exercises == {f"Exercise: {first.title}", f"Exercise: {last.title}"}
+    assert set(there.values()) == {1}, "what stays is not registered again"
 
 
 def test_a_page_that_shows_the_scene_alone_has_none(port):
