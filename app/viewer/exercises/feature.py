@@ -143,7 +143,7 @@ class Practising(Feature):
 
     def step_name(self, key: Hashable) -> str:
         names = {"open": "Exercise", "list": "List of exercises", "hint": "Hint", "again": "New numbers"}
-        return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Ghost"
+        return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Answer"
 
     def on_robot(self) -> None:
         self._drawing.arm(None)  # of an arm that is not on show
