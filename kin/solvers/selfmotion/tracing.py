@@ -46,7 +46,7 @@ _CORRECTIONS, _NEAR = 12, 1e-6  # steps; rad: the last one, to go on from there
 _MISSED = 1e-5  # m and rad: an error that such a step can remove
 _ERROR, _SPLITS = 0.02, 6  # of a cubic, times the fourth power of its length; how often a step is halved
 _BESIDE, _SAME = 1e-3, 1e-7  # rad from the cubics, and from the curve: a posture on it
-_EMPTY = 1e-12  # rad: what is between two events as close as that is no piece
+_EMPTY = 1e-12  # rad: what is between two events as close as that is no piece; a joint that moves less stands still
 FAILED, OPEN, CLOSED = range(3)
 Whole = NDArray[np.int64]
 Curve = tuple[Array, Array, Array, Array]  # two points (7,) and the tangents there
@@ -234,7 +234,7 @@ def _events_between(task: Task, limits: tuple[Array, Array], curve: Curve, event
     for c in range(7):
         a, b, d = _cubic(curve, c)
         n = _turning(a, b, d, stops)
-        if c == task.joint:
+        if c == task.joint and not _is_still(a, b, d):
             for i in range(1, n - 1):
                 count = _add_event(stops[i], FOLD, 0.0, events, count)
         half, middle = 0.5 * (upper[c] - lower[c]), 0.5 * (upper[c] + lower[c])
@@ -249,6 +249,12 @@ def _events_between(task: Task, limits: tuple[Array, Array], curve: Curve, event
 
 
 @jit
+def _is_still(a: float, b: float, d: float) -> bool:
+    """Whether a joint with this cubic stands still: where it would turn back is decided by rounding errors."""
+    return max(abs(a), abs(b), abs(d)) < _EMPTY
+
+
+@jit
 def _is_close_call(task: Task, limits: tuple[Array, Array], curve: Curve) -> bool:
     """Whether the cubics decide by no more than their error that a joint meets a limit or turns back."""
     lower, upper = limits
@@ -257,7 +263,7 @@ def _is_close_call(task: Task, limits: tuple[Array, Array], curve: Curve) -> boo
     for c in range(7):
         a, b, d = _cubic(curve, c)
         turns = 0.0 < -b < 3.0 * d or 0.0 > -b > 3.0 * d
-        if c == task.joint and turns and abs(a - b * b / (3.0 * d)) < 4.0 * error:
+        if c == task.joint and turns and not _is_still(a, b, d) and abs(a - b * b / (3.0 * d)) < 4.0 * error:
             return True
         half, middle = 0.5 * (upper[c] - lower[c]), 0.5 * (upper[c] + lower[c])
         if half < math.pi:
@@ -500,7 +506,7 @@ def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, 
     value = redundancy_value(task, piece)
     first, score = value, -math.inf
     begun, around, found, k = not closed, False, 0, 0
-    ahead, left = np.empty((_SPLITS, 14)), 0
+    ahead, left, shortest = np.empty((_SPLITS, 14)), 0, 0.0
     while True:
         if left == 0 and k == path.shape[0] - 1:
             if not begun and is_inside(limits[0], limits[1], best, -1):
@@ -511,12 +517,13 @@ def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, 
         if left == 0:
             _load(path, k, curve)
             k += 1
+            shortest = 1.5 * _length(curve) / (1 << _SPLITS)
         else:
             left -= 1
             for i in range(7):
                 curve[0][i], curve[1][i] = curve[2][i], curve[3][i]
                 curve[2][i], curve[3][i] = ahead[left, i], ahead[left, 7 + i]
-        while left < _SPLITS and _is_close_call(task, limits, curve):
+        while left < _SPLITS and _length(curve) > shortest and _is_close_call(task, limits, curve):
             _at(curve, 0.5, at)
             if not _project(task, at, p):
                 return -1

@@ -700,7 +700,7 @@ def test_code_writes_a_file_and_names_bad_input(capsys, tmp_path, monkeypatch):
     typed = kin.robot_to_toml("puma560").replace("90", "89.999").replace('id = "', 'id = "typed-')
     Path("typed.toml").write_text(typed, encoding="utf-8")
     for words, field, valid in (
-        (("typed.toml",), "robot: got 'typed-puma560'", "Write alpha of waist as pi/2 (90°)"),
+        (("typed.toml",), "robot: got 'typed-puma560'", "alpha of waist as pi/2 (90°)"),
         (("planar2r", "-o", "missing/arm.c"), "--output: got 'missing/arm.c'", "a file that can be written"),
         (("planar2r", "--name", "2r"), "name: got '2r'", "a letter, then at most 39 letters, digits and _"),
         (("planar2r", "--language", "fortran"), "invalid choice: 'fortran'", "'c', 'js', 'mjs', 'd.ts', 'c-test'"),

@@ -36,9 +36,9 @@ def test_parts_are_listed_without_compiling_for_arms_that_visitors_may_bring():
     """Matching a general arm compiles for many seconds, which an event loop would wait for."""
     assert tuple(map(family_of, made_up_arms())) == MADE_UP
     program = (
-        "from kin import warmup; from kin.solvers.general6.batch import branches_many\n"
-        "warmup.parts(); assert not branches_many.overloads\n"
-        "warmup.family_of(warmup.made_up_arms()[2]); assert branches_many.overloads"
+        "from kin import warmup; from kin.solvers.general6.batch import solve_all\n"
+        "warmup.parts(); assert not solve_all.overloads\n"
+        "warmup.family_of(warmup.made_up_arms()[2]); assert solve_all.overloads"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
 
