@@ -158,7 +158,8 @@ def built(core: Path, level: str) -> Path:
         known, _, name = index.read_text("utf-8").partition("\n")
         if known == state and (file := folder / name).exists():
             with contextlib.suppress(OSError):  # a folder that is only read
-                os.utime(file)  # it is used
+                os.utime(file)  # they are used
+                os.utime(index)
             return file
     command = [sys.executable, "-m", BUILDER, str(folder), "--level", level]
     environment = os.environ | {"KINBOARD_KERNELS": PYTHON, "PYTHONPATH": str(core.parent)}

@@ -18,6 +18,7 @@ import importlib.util
 import os
 import re
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -51,6 +52,12 @@ LEVELS: Mapping[str, tuple[str, ...]] = {
 LINUX, MACOS, WINDOWS = "linux-gnu.2.17", "macos.11.0", "windows-gnu"
 _LINKED: Mapping[str, tuple[str, ...]] = {LINUX: ("-lm",), MACOS: ("-Wl,-undefined,dynamic_lookup",), WINDOWS: ()}
 UNUSED = 30 * 86400.0  # s: what is kept and was not used for so long is removed
+# What is kept, by its place in the folder, where there may be other files: texts, objects, extensions, and what
+# `kin.kernels.ahead` notes of them.
+_HASH = "[0-9a-f]{32}"
+_OWN = re.compile(
+    rf"texts/{_HASH}\.c|objects/{_HASH}\.o|{_HASH}/_kernels_\w+\.(abi3\.so|pyd)|{_HASH}-\w+\.txt(\.\d+)?"
+)
 Say = Callable[[str], object]
 
 
@@ -190,11 +197,13 @@ def _kept(file: Path, make: Callable[[Path], object]) -> Path:
 
 
 def prune(folder: Path) -> None:
-    """Remove what was not used for `UNUSED` seconds."""
-    for file in folder.rglob("*.*"):
-        with contextlib.suppress(FileNotFoundError):  # another process has removed it
-            if time.time() - file.stat().st_mtime > UNUSED:
-                file.unlink()
+    """Remove what is kept in a folder and was not used for `UNUSED` seconds."""
+    for file in (*folder.glob("*.*"), *folder.glob("*/*.*")):
+        if _OWN.fullmatch(file.relative_to(folder).as_posix()):
+            with contextlib.suppress(FileNotFoundError):  # another process has removed it
+                about = file.lstat()
+                if stat.S_ISREG(about.st_mode) and time.time() - about.st_mtime > UNUSED:
+                    file.unlink()
 
 
 def _hash(*parts: object) -> str:

@@ -27,18 +27,24 @@ def core(tmp_path, monkeypatch):
     return found
 
 
-def test_it_is_built_again_only_when_a_file_has_changed(core, monkeypatch):
-    asked = []
+@pytest.fixture
+def asked(monkeypatch):
+    """What kernels are in each process that has built the extension; the builder makes an empty file."""
+    found = []
 
     def builder(command, **options):
         assert command[1:3] == ["-m", ahead.BUILDER]
-        asked.append(options["env"]["KINBOARD_KERNELS"])
-        file = Path(command[3]) / str(len(asked)) / "_kernels.so"
+        found.append(options["env"]["KINBOARD_KERNELS"])
+        file = Path(command[3]) / str(len(found)) / "_kernels.so"
         file.parent.mkdir(parents=True)
         file.touch()
         return SimpleNamespace(returncode=0, stdout=f"{file}\n")
 
     monkeypatch.setattr(ahead.subprocess, "run", builder)
+    return found
+
+
+def test_it_is_built_again_only_when_a_file_has_changed(core, asked):
     first = ahead.built(core, "level")
     assert ahead.built(core, "level") == first
     assert asked == ["python"]
@@ -51,6 +57,17 @@ def test_it_is_built_again_only_when_a_file_has_changed(core, monkeypatch):
     (core / "new.py").touch()
     ahead.built(core, "level")
     assert len(asked) == 4
+
+
+def test_what_is_used_says_so(core, asked):
+    """Else the builder removes it."""
+    file = ahead.built(core, "level")
+    (index,) = file.parents[1].glob("*-level.txt")
+    for each in (file, index):
+        os.utime(each, (0.0, 0.0))
+    assert ahead.built(core, "level") == file
+    assert min(each.stat().st_mtime for each in (file, index)) > 0.0
+    assert len(asked) == 1
 
 
 def test_where_it_cannot_be_built_it_is_said_what_to_set(core, monkeypatch):

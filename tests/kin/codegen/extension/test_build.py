@@ -78,11 +78,41 @@ def test_declarations_are_those_of_pythons_headers(tmp_path):
     subprocess.run(command, cwd=tmp_path, check=True)
 
 
-def test_what_is_used_no_more_is_removed(tmp_path):
-    for name, age in (("old", build.UNUSED + 60.0), ("new", build.UNUSED - 3600.0)):
-        file = tmp_path / "objects" / f"{name}.o"
-        file.parent.mkdir(exist_ok=True)
-        file.touch()
-        os.utime(file, (0.0, time.time() - age))
+OWN = [
+    "texts/{}.c",
+    "objects/{}.o",
+    "{}/_kernels_x86_64_v3.abi3.so",
+    "{}/_kernels_aarch64.pyd",
+    "{}-x86_64_v3.txt",
+    "{}-aarch64.txt.1234",
+]
+FOREIGN = [
+    *("notes.txt", "thesis/main.c", "objects/old.o", "a.out/x.o", "objects/deep/{}.o", "{}.o", "{}/notes.txt"),
+    "texts/{}.c/main.c",
+]
+
+
+def old(file, age=build.UNUSED + 60.0):
+    file.parent.mkdir(exist_ok=True, parents=True)
+    file.touch()
+    os.utime(file, (0.0, time.time() - age))
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_what_is_used_no_more_is_removed(tmp_path, name):
+    first, second = (tmp_path / name.format(build._hash(k)) for k in (1, 2))
+    old(first)
+    old(second, build.UNUSED - 3600.0)
     build.prune(tmp_path)
-    assert [file.name for file in tmp_path.rglob("*.o")] == ["new.o"]
+    assert not first.exists()
+    assert second.exists()
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_files_that_others_have_put_into_the_folder_stay(tmp_path, name):
+    file = tmp_path / name.format(build._hash(1))
+    old(file)
+    for folder in file.relative_to(tmp_path).parents:
+        os.utime(tmp_path / folder, (0.0, 0.0))
+    build.prune(tmp_path)
+    assert file.exists()
