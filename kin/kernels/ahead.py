@@ -5,7 +5,7 @@ extension, ``python`` runs them as they are written, for debugging and for a com
 
 A wheel has the extension beside the package, one file for each level of processors. In a checkout it is built when
 it is first needed (:mod:`kin.codegen.extension.build`), and again when a file of the core has changed, which takes
-seconds; it is kept in the user's cache folder.
+seconds; it is kept in `extension` in the user's cache folder, which nobody else may change.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from kin.kernels import layout
-from kin.kernels.sources import user_folder
+from kin.kernels.sources import shared_with, user_folder
 from kin.transforms import is_plain
 
 NUMBA, C, PYTHON = "numba", "c", "python"
@@ -149,14 +149,15 @@ def built(core: Path, level: str) -> Path:
     """The extension of a checkout, built again if a file of its core has changed since the last time.
 
     Raises:
-        ImportError: it cannot be built; what the compiler says is on the standard error.
+        ImportError: it cannot be built, and what the compiler says is on the standard error; or others may change
+            the folder where it is kept.
     """
-    folder = user_folder() / "extension"
+    folder = _folder()
     index = folder / f"{_hash(str(core))}-{level}.txt"
     state = _state(core)
     if index.exists():
         known, _, name = index.read_text("utf-8").partition("\n")
-        if known == state and (file := folder / name).exists():
+        if known == state and _is_within(folder, file := folder / name):
             with contextlib.suppress(OSError):  # a folder that is only read
                 os.utime(file)  # they are used
                 os.utime(index)
@@ -171,6 +172,24 @@ def built(core: Path, level: str) -> Path:
     beside.write_text(f"{state}\n{file.relative_to(folder)}", "utf-8")
     beside.replace(index)
     return file
+
+
+def _folder() -> Path:
+    """The folder of extensions, made if it is missing."""
+    hint = "set KINBOARD_CACHE to another folder"
+    try:
+        folder = user_folder() / "extension"
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        owned = shared_with(folder, 0o022, owners=frozenset({0}))
+    except (OSError, RuntimeError) as error:
+        raise ImportError(f"there is no folder to keep compiled kernels in: {error}; {hint}") from error
+    if owned:
+        raise ImportError(f"{folder} may be changed by others ({owned}): chmod 700, or {hint}")
+    return folder
+
+
+def _is_within(folder: Path, file: Path) -> bool:
+    return file.is_file() and file.resolve().is_relative_to(folder.resolve())
 
 
 def _state(core: Path) -> str:

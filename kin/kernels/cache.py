@@ -28,7 +28,6 @@ import io
 import os
 import pickle
 import re
-import stat
 import sys
 import time
 import uuid
@@ -52,7 +51,7 @@ from kin.kernels.private import (
     rebuild_environment,
     rtsys,
 )
-from kin.kernels.sources import fingerprint, user_folder
+from kin.kernels.sources import fingerprint, shared_with, user_folder
 
 CAPACITY = 512 << 20  # bytes; all kernels of one version take 25 MB
 _DAY = 86400.0  # s: a file that is used says so at most once a day
@@ -78,14 +77,11 @@ def kernel_folder() -> Path | None:
     try:
         folder = Path(given, "kinboard") if given else user_folder() / "kernels"
         folder.mkdir(mode=0o777 if given else 0o700, parents=True, exist_ok=True)
-        found = folder.lstat()
+        owned = "" if given else shared_with(folder, 0o077)
     except (OSError, RuntimeError) as error:
         _warn(f"there is no folder to keep machine code in: {error}; {hint}")
         return None
-    if given or sys.platform == "win32":  # there, the user's cache folder is private by its access list
-        return folder
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o077:
-        owned = f"owner {found.st_uid}, {stat.filemode(found.st_mode)}"
+    if owned:
         _warn(f"{folder} may be changed or read by others ({owned}) and is not used: chmod 700, or {hint}")
         return None
     return folder

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import stat
 import sys
 from functools import cache
 from pathlib import Path
@@ -43,6 +44,24 @@ def file_of(module: str) -> str | None:
     """The file of a module or package of the core; None for another name. Plain strings: `Path` takes longer."""
     place = os.path.join(_ROOT, *module.split("."))  # noqa: PTH118
     return next((file for file in (f"{place}.py", f"{place}/__init__.py") if os.path.isfile(file)), None)  # noqa: PTH113
+
+
+def shared_with(folder: Path, strangers: int, owners: frozenset[int] = frozenset()) -> str:
+    """Who besides this user may change a folder, as its owner and mode; empty: nobody.
+
+    Code from a folder that others may change is not executed. A link counts as a folder of others.
+
+    Args:
+        strangers: what nobody else may, as bits of a mode.
+        owners: to whom the folder may belong besides this user.
+    """
+    found = folder.lstat()
+    if sys.platform == "win32":  # there, the user's cache folder is private by its access list
+        return ""
+    private = stat.S_ISDIR(found.st_mode) and not found.st_mode & strangers
+    if private and found.st_uid in {os.geteuid(), *owners}:
+        return ""
+    return f"owner {found.st_uid}, {stat.filemode(found.st_mode)}"
 
 
 def user_folder() -> Path:

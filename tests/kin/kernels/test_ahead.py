@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -68,6 +69,58 @@ def test_what_is_used_says_so(core, asked):
     assert ahead.built(core, "level") == file
     assert min(each.stat().st_mtime for each in (file, index)) > 0.0
     assert len(asked) == 1
+
+
+def test_an_index_names_only_files_of_its_folder(core, asked, tmp_path):
+    file = ahead.built(core, "level")
+    (index,) = file.parents[1].glob("*-level.txt")
+    other = tmp_path / "other.so"
+    other.touch()
+    state = index.read_text().partition("\n")[0]
+    for k, name in enumerate((str(other), "../../other.so", ".", "")):
+        index.write_text(f"{state}\n{name}")
+        assert ahead.built(core, "level").parents[1] == file.parents[1]
+        assert len(asked) == k + 2
+
+
+def of_somebody_else(folder, monkeypatch):
+    if os.geteuid() == 0:
+        os.chown(folder, 12345, -1)
+    else:
+        monkeypatch.setattr(os, "geteuid", lambda: folder.stat().st_uid + 1)
+
+
+def mode(bits):
+    return lambda folder, monkeypatch: folder.chmod(bits)
+
+
+def linked(folder, monkeypatch):
+    folder.rename(folder.with_name("elsewhere"))
+    folder.symlink_to(folder.with_name("elsewhere"))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no modes")
+@pytest.mark.parametrize("make", [of_somebody_else, linked, *map(mode, (0o720, 0o702, 0o777))])
+def test_a_folder_that_others_may_have_written_is_not_read(core, asked, monkeypatch, make):
+    folder = ahead.built(core, "level").parents[1]
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    make(folder, monkeypatch)
+    with pytest.raises(ImportError, match=r"may be changed by others .*: chmod 700, or set KINBOARD_CACHE"):
+        ahead.built(core, "level")
+    assert len(asked) == 1
+
+
+def test_a_folder_that_others_may_read_is_read(core, asked):
+    file = ahead.built(core, "level")
+    file.parents[1].chmod(0o755)
+    assert ahead.built(core, "level") == file
+
+
+def test_where_there_is_no_folder_it_is_said_what_to_set(core, asked, tmp_path):
+    (tmp_path / "cache").touch()
+    with pytest.raises(ImportError, match=r"no folder to keep .*set KINBOARD_CACHE"):
+        ahead.built(core, "level")
+    assert not asked
 
 
 def test_where_it_cannot_be_built_it_is_said_what_to_set(core, monkeypatch):
