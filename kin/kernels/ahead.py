@@ -16,6 +16,7 @@ import os
 import platform
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property, update_wrapper
 from importlib.machinery import ExtensionFileLoader
@@ -99,7 +100,12 @@ def loaded(file: Path, readable: bool = layout.READABLE) -> Any:
 
     Args:
         readable: whether it reads the fields of arrays, rather than asking each for its buffer.
+
+    Raises:
+        ImportError: objects of this Python are others than those that it is compiled for.
     """
+    if sysconfig.get_config_var("Py_GIL_DISABLED"):
+        raise ImportError("compiled kernels need a Python with a GIL: set KINBOARD_KERNELS=numba, or python")
     spec = spec_from_file_location("kin._kernels", file, loader=ExtensionFileLoader("kin._kernels", str(file)))
     assert spec is not None
     assert spec.loader is not None
@@ -197,7 +203,10 @@ def _state(core: Path) -> str:
     found = []
     for place, folders, files in os.walk(core):
         folders[:] = [each for each in folders if each != "__pycache__"]
-        found += [(each.path, each.stat().st_mtime_ns) for each in os.scandir(place) if each.name in files]
+        for each in os.scandir(place):
+            if each.name in files:
+                with contextlib.suppress(FileNotFoundError):  # a link to nothing, as editors make
+                    found.append((each.path, each.stat().st_mtime_ns))
     return _hash(sorted(found))
 
 

@@ -60,6 +60,19 @@ def test_it_is_built_again_only_when_a_file_has_changed(core, asked):
     assert len(asked) == 4
 
 
+def test_a_link_to_nothing_in_the_core_is_no_error(core, asked):
+    """Editors make such links beside a file that has changes."""
+    first = ahead.built(core, "level")
+    (core / ".#one.py").symlink_to("user@host.1234")
+    assert ahead.built(core, "level") == first
+
+
+def test_a_python_without_a_gil_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(ahead.sysconfig, "get_config_var", {"Py_GIL_DISABLED": 1}.get)
+    with pytest.raises(ImportError, match="need a Python with a GIL: set KINBOARD_KERNELS=numba"):
+        ahead.loaded(tmp_path / "missing.so")
+
+
 def test_what_is_used_says_so(core, asked):
     """Else the builder removes it."""
     file = ahead.built(core, "level")
