@@ -68,7 +68,11 @@ class WheelHook(BuildHookInterface):
                 self._add_kernels(root, build_data)
 
     def _add_kernels(self, root: Path, build_data: dict[str, Any]) -> None:
-        system, *levels = os.environ.get("KINBOARD_TARGET", "").split() or [""]
+        target = os.environ.get("KINBOARD_TARGET", "")
+        system, *levels = target.split() or [""]
+        if system and (system not in PLATFORMS or not levels):
+            wanted = f"a system ({', '.join(PLATFORMS)}) and one or more levels of its processors"
+            raise ValueError(f"KINBOARD_TARGET={target}: it is {wanted}, as linux-gnu.2.17 x86_64_v2 x86_64_v3")
         platform = re.sub(r"\W", "_", sysconfig.get_platform())
         for level in levels or [""]:
             options = ["--system", system, "--level", level] if level else []

@@ -270,6 +270,16 @@ def test_kernels_are_compiled_for_what_is_named(hook, monkeypatch, target, files
     assert (data["tag"], data["pure_python"]) == (f"cp311-abi3-{platform}", False)
 
 
+@pytest.mark.parametrize("target", ["windows-gnu", "x86_64_v3", "linux x86_64_v3"])
+def test_a_target_without_a_system_or_a_level_is_refused(hook, monkeypatch, target):
+    """They would be compiled for this machine, or for nothing."""
+    monkeypatch.setenv("KINBOARD_KERNELS", "c")
+    monkeypatch.setenv("KINBOARD_TARGET", target)
+    with pytest.raises(ValueError, match=f"KINBOARD_TARGET={target}: it is a system .*macos.* level"):
+        hook.initialize("standard", {"force_include": {}})
+    hook.finalize("standard", {}, "")
+
+
 def test_a_wheel_has_no_kernels_unless_they_are_asked_for(hook):
     data = {"force_include": {}}
     hook.initialize("standard", data)
