@@ -227,7 +227,8 @@ static PyObject *give_array(char letter, int ndim, const kinboard_slot *from) {
   if (shape != NULL) made = PyObject_CallFunctionObjArgs(numpy_empty, shape, items[item].dtype, NULL);
   if (shape != NULL) Py_DecRef(shape);
   Py_buffer view;
-  if (made == NULL || PyObject_GetBuffer(made, &view, PyBUF_WRITABLE) != 0) return NULL;
+  if (made == NULL) return NULL;
+  if (PyObject_GetBuffer(made, &view, PyBUF_WRITABLE) != 0) return Py_DecRef(made), NULL;
   memcpy(view.buf, from->p, size);
   PyBuffer_Release(&view);
   return made;

@@ -89,6 +89,18 @@ def test_arrays_that_are_made_belong_to_python(module):
     assert (other.tolist(), given.tolist(), size) == ([-1.0, 1.0, 2.0], [0.0, 1.0, 2.0], 3)
 
 
+def test_an_array_that_cannot_be_filled_is_given_up(file, tmp_path):
+    copy = tmp_path / "_kernels.so"
+    copy.write_bytes(file.read_bytes())
+    module, made = ahead.loaded(copy), object()
+    types = tuple(map(np.dtype, ahead._DTYPES))
+    module.set_up(np.ndarray, np.bool_, lambda shape, dtype: made, types, True)
+    before = sys.getrefcount(made)
+    with pytest.raises(TypeError):
+        call(module, small.ramp)(3, 0.5)
+    assert sys.getrefcount(made) == before
+
+
 @pytest.mark.parametrize("size", [-1, 2**58, 2**60, 2**62 + 1])
 def test_an_array_that_does_not_fit_into_memory_is_a_memory_error(module, size):
     with pytest.raises(MemoryError):
