@@ -16,11 +16,14 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
-from numba import njit
-
-from kin.kernels.cache import KernelCache
+from kin.kernels.ahead import CHOSEN, NUMBA
 from kin.kernels.compile import PLAIN
-from kin.kernels.private import CACHE, CALLS, MISSING
+
+if CHOSEN == NUMBA:
+    from numba import njit
+
+    from kin.kernels.cache import KernelCache
+    from kin.kernels.private import CACHE, CALLS, MISSING
 
 TRIES = 2  # processes that may end before a kernel is compiled here
 VAIN = 3  # kernels that were compiled and not kept, as on a full disk, after which no other process is asked
@@ -38,7 +41,7 @@ class _Thread(threading.local):
 _ask: Ask | None = None
 _vain = 0
 _thread = _Thread()
-_kernels: Any = type(njit(lambda: None))  # the class of all kernels
+_kernels: Any = type(njit(lambda: None)) if CHOSEN == NUMBA else None  # the class of all kernels
 _compile: Any = getattr(_kernels, "compile", None)
 
 
@@ -49,13 +52,15 @@ class _MissingError(Exception):
 def compile_elsewhere(ask: Ask | None) -> None:
     """From now on, have another process compile the kernels that are in no cache; None: compile them here.
 
+    Does nothing where numba compiles no kernels.
+
     Args:
         ask: called in the thread that needs a kernel, with the line for `serve` in the other process. Returns
             whether it is compiled, and may raise instead; the caller of the kernel gets the exception.
     """
     global _ask, _vain
     _ask, _vain = ask, 0
-    if not (PLAIN or MISSING.keys() & {CACHE, CALLS}):
+    if CHOSEN == NUMBA and not (PLAIN or MISSING.keys() & {CACHE, CALLS}):
         _kernels.compile = _compile if ask is None else _compile_with_help
 
 

@@ -10,7 +10,7 @@ gains. If a name is missing, its gain is done without, and importing this module
 
 Attributes of objects that exist only while kernels are compiled cannot be looked up here. If one is missing,
 machine code cannot be loaded: kernels are then compiled in each process, of which :mod:`kin.kernels.cache` warns.
-The layout of NumPy's arrays is in :mod:`kin.kernels.arguments`.
+The layout of NumPy's arrays is in :mod:`kin.kernels.layout`.
 """
 
 from __future__ import annotations
