@@ -62,6 +62,18 @@ def test_other_machines_need_ziglang(level, system):
     assert f"--target={level.split('_v')[0]}-{system}" in build.options_for(level, system, zig=True)
 
 
+@pytest.mark.parametrize("level", ["x86_64_v3", "x86_64_v4"])
+def test_the_machines_own_clang_tunes_for_the_machine(monkeypatch, level):
+    """It may be older than 16, which does not know `-tune-cpu`."""
+    monkeypatch.setattr(build, "levels", lambda: [level])
+    monkeypatch.setattr(build, "own_system", lambda: build.LINUX)
+    own, other = (build.options_for(level, build.LINUX, zig=zig) for zig in (False, True))
+    assert {"-mtune=native", f"-march={level.replace('_', '-')}"} <= set(own)
+    assert not {"-Xclang", "-tune-cpu", "znver4"} & set(own)
+    assert {"-Xclang", "-tune-cpu", "znver4"} <= set(other)
+    assert "-mtune=native" not in other
+
+
 def test_windows_imports_what_is_declared():
     found = build.imports_of(build.module_of([]))
     assert {"PyExc_TypeError DATA", "_Py_NoneStruct DATA", "PyTuple_New", "Py_IncRef"} <= set(found)
