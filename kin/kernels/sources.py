@@ -11,7 +11,8 @@ from functools import cache
 from pathlib import Path
 
 _ROOT = str(Path(__file__).parents[2])
-_IMPORT = re.compile(r"^from (kin[\w.]*) import (?:\(([^)]*)\)|([^(\n]*))", re.MULTILINE)
+# At the top level, or under a condition there: `compile` imports what numba needs under one.
+_IMPORT = re.compile(r"^(?: {4})?from (kin[\w.]*) import (?:\(([^)]*)\)|([^(\n]*))", re.MULTILINE)
 # How kernels are kept and loaded: what is compiled does not depend on it.
 _APART = {str(Path(__file__).parent / f"{name}.py") for name in ("ahead", "cache", "sources")}
 
@@ -29,7 +30,7 @@ def fingerprint(file: str) -> str:
 
 @cache
 def _read(file: str) -> tuple[bytes, frozenset[str]]:
-    """Hash of the text of a file, and the files of the core that it imports at its top level."""
+    """Hash of the text of a file, and the files of the core that it imports, also under a condition."""
     text = Path(file).read_text(encoding="utf-8")
     imports = set()
     for module, several, one in _IMPORT.findall(text):

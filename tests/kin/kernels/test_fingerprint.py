@@ -10,7 +10,8 @@ FILES = {
     "kin/kernel.py": "from kin.solver import solve\nfrom kin import constants\n",
     "kin/solver/__init__.py": "from kin.solver.steps import (\n    solve as solve,\n)\n",
     "kin/solver/steps.py": "from kin.kernel import nothing  # a circle\n",
-    "kin/constants.py": "LIMIT = 1.0\n",
+    "kin/constants.py": "LIMIT = 1.0\nif True:\n    from kin.chosen import (\n        x,\n    )\n",
+    "kin/chosen.py": "x = 1\n",
     "kin/other.py": "from kin.kernel import solve\n",
 }
 KERNEL = "kin/kernel.py"
@@ -38,7 +39,10 @@ def changed(tmp_path, monkeypatch):
     forget()
 
 
-@pytest.mark.parametrize("name", [KERNEL, "kin/solver/__init__.py", "kin/solver/steps.py", "kin/constants.py"])
+@pytest.mark.parametrize(
+    "name",
+    [KERNEL, "kin/solver/__init__.py", "kin/solver/steps.py", "kin/constants.py", "kin/chosen.py"],
+)
 def test_a_change_of_what_is_imported_recompiles_the_kernel(changed, name):
     assert changed() != changed(name)
 
