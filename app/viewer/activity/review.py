@@ -43,8 +43,8 @@ class Missed:
         stage: how often it was right since, on days when it was due.
         due: the day from which it is asked again, counted from 1 January 1970.
         robot: the id of the arm that the question of a lesson is about.
-        before: the ids of the arms that it was about before, the last first, and of the present one once it was
-            answered, `MOST_ARMS` at most; empty as long as it was about one arm alone.
+        before: the ids of the arms that it was about before, the last first, `MOST_ARMS` at most. From the second
+            time that it is asked on, the present one is among them once it is answered, or asked about again.
     """
 
     key: str
