@@ -277,8 +277,12 @@ DECLARED = {
             "app/service/compute/test_pool.py::test_a_process_that_ends_loses_one_request",
             "app/service/start/test_compiler.py::test_a_process_that_ends_says_so",
         ),
-        "kin/codegen/extension/build.py": ("kin/kernels/test_ahead.py::test_where_it_cannot_be_built_it_is_said_what_to_set",),
-        "kin/kernels/ahead.py": ("kin/kernels/test_ahead.py::test_where_it_cannot_be_built_it_is_said_what_to_set",),
+        "kin/codegen/extension/build.py": (
+            "kin/kernels/test_ahead.py::test_where_it_cannot_be_built_it_is_said_what_to_set",
+        ),
+        "kin/kernels/ahead.py": (
+            "kin/kernels/test_ahead.py::test_where_it_cannot_be_built_it_is_said_what_to_set",
+        ),
         "app/notebook/process.py": ("app/notebook/test_notebook.py::test_the_process_serves_and_ends",),
         "app/viewer/meshes/reader.py": ("app/viewer/meshes/test_loading.py::test_the_process_says_what_is_wrong",),
         "app/cli/xacro/__init__.py": ("app/cli/test_xacro.py::test_what_is_missing_is_named",),
@@ -290,7 +294,9 @@ DECLARED = {
         "courses": ("courses",),
         "lti": ("app/classroom/test_lti.py::test_the_service_does_not_start_with_a_wrong_file",),
         "kin/kernels/cache.py": ("cache",),
-        "kin/codegen/extension/build.py": ("kin/codegen/extension/test_build.py::test_only_a_unit_that_has_changed_is_compiled_again",),
+        "kin/codegen/extension/build.py": (
+            "kin/codegen/extension/test_build.py::test_only_a_unit_that_has_changed_is_compiled_again",
+        ),
         "app/bench/contestants/motions.py": ("bench/test_bench.py::test_a_library_that_is_missing_or_fails",),
     },
     "peers": {
