@@ -305,7 +305,7 @@ SAID = {  # what is stored of a student and of an answer, by column, and how the
     "recalled": "how many answers in <i>Review</i> were right",
     "answer": "your answers to exercises",
     "verdict": "verdicts",
-    "cause": "recognised mistakes",
+    "cause": "recognised errors",
     "at": "times",
 }
 KEPT = {"id", "room_id", "seat_id", "removed", "beat", "version"}  # by the service, of no interest to students
