@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import struct
 
-from kin.kernels import simd
-from kin.kernels.ahead import CHOSEN, NUMBA
-from kin.kernels.compile import PLAIN
-
 _WORD = (1 << 64) - 1
 
 
@@ -19,12 +15,3 @@ def bits_of(x: float) -> int:
 def float_of(bits: int) -> float:
     """The float of the lowest 64 bits of an integer, as `kin.kernels.simd.float_of`."""
     return float(struct.unpack("<d", struct.pack("<Q", bits & _WORD))[0])
-
-
-def stand_in() -> None:
-    """Where kernels are not compiled, have them call these functions.
-
-    They are not in :mod:`kin.kernels.simd`, since all machine code depends on its text.
-    """
-    if PLAIN or CHOSEN != NUMBA:
-        vars(simd).update(bits_of=bits_of, float_of=float_of)

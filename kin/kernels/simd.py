@@ -21,6 +21,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from kin.kernels import plain
 from kin.kernels.ahead import CHOSEN, NUMBA
 from kin.kernels.compile import PLAIN, inlined
 
@@ -199,3 +200,4 @@ if PLAIN or CHOSEN != NUMBA:
         return math.atan2(y, x)
 
     fma, widest = (lambda a, b, c: a * b + c), (lambda: None)
+    bits_of, float_of = plain.bits_of, plain.float_of

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from types import FunctionType
 
 import numpy as np
@@ -34,12 +37,12 @@ def test_quarter_turns_as_they_are_written_are_sine_and_cosine():
 
 
 @pytest.mark.parametrize("chosen", ["c", "python"])
-def test_they_stand_in_where_kernels_are_not_compiled_by_numba(monkeypatch, chosen):
-    for name in ("bits_of", "float_of"):
-        monkeypatch.setattr(simd, name, getattr(simd, name))  # given back after the test
-    monkeypatch.setattr(plain, "CHOSEN", chosen)
-    plain.stand_in()
-    assert (simd.bits_of, simd.float_of) == (plain.bits_of, plain.float_of)
+def test_they_stand_in_where_kernels_are_not_compiled_by_numba(chosen):
+    program = (
+        "from kin.kernels import plain, simd\n"
+        "assert (simd.bits_of, simd.float_of) == (plain.bits_of, plain.float_of)"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, env=os.environ | {"KINBOARD_KERNELS": chosen})
 
 
 @pytest.mark.skipif(CHOSEN != NUMBA, reason="kernels are not compiled")
