@@ -32,7 +32,7 @@ _empty, _ndarray = np.empty, np.ndarray
 
 
 class _Compiled:
-    """Entry points of kernels that do not check their arguments, each loaded or compiled on first use."""
+    """Entry points of kernels that do not check their arguments, each loaded on first use."""
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:

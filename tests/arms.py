@@ -14,6 +14,7 @@ import kin
 from kin import Joint, Robot
 from kin.ik import IKOptions, JointConstraints
 from kin.ik.problem import IKProblem
+from kin.solvers import family_of
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 # Expensive tests run over these, cheap ones over the whole library. Older trees, which the differential test asks
@@ -194,3 +195,31 @@ def with_slides(robot, seed):
         for row, sliding in zip(robot.rows, slides, strict=True)
     ]
     return replace(robot, id=f"{robot.id}-slides", rows=tuple(rows))
+
+
+def one_of_each_family():
+    """The first built-in arm of each closed form, and the first without one."""
+    families = {}
+    for robot in CLASSICS:
+        families.setdefault(family_of(robot), robot)
+    return tuple(families.values())
+
+
+# Families of `made_up_arms`, in their order.
+MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3", "slides3", "slides2")
+
+
+def made_up_arms():
+    """Arms of the families that no built-in arm belongs to."""
+    quarter = 0.5 * math.pi
+    parallel = ((0, 0.1, 0, quarter), (0, 0, 0.3, 0), (0, 0, 0.2, 0), (0, 0.05, 0, quarter), (0, 0.1, 0, 0))
+    oblique = tuple((0.3 * i, 0.1 + 0.1 * i, 0.3 - 0.05 * i, 0.7 + 0.1 * i) for i in range(5))
+    planar = ((0, 0.1, 0.3, 0),) * 4
+    turned = (*oblique[:2], (0, 0.2, 0, 0.4))
+    home = [0.3, 0.5, 0.7, 0.4, 0.6, 0.2]
+    arms = tuple(Robot.from_dh(t, home=home[: len(t)]) for t in (parallel, planar, oblique, oblique[:2], turned))
+    kinds = ("prismatic",) * 3 + ("revolute",) * 3
+    gantry = [
+        {"kind": kind, "theta": 0.7, "d": 0.1, "a": 0.1, "alpha": 0.9 + 0.1 * i} for i, kind in enumerate(kinds)
+    ]
+    return *arms, Robot.from_dh(gantry, home=home), Robot.from_dh(gantry[1:4], home=home[:3])

@@ -12,12 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from arms import ONE_OF_EACH_SOLVER
+from arms import ONE_OF_EACH_SOLVER, one_of_each_family
 from hypothesis import settings
 from playwright.sync_api import Browser, sync_playwright
 
 import kin
-from kin.warmup import one_of_each_family
 
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
@@ -53,9 +52,6 @@ LONG = frozenset(
         "e2e/test_screens.py",
         "kin/codegen/test_exact.py",
         "kin/codegen/test_generated_files.py",
-        "kin/kernels/test_kernels.py",
-        "kin/kernels/test_loaded_kernels.py",
-        "kin/warmup/test_warmup.py",
     )
 )
 assert not (moved := [str(file) for file in LONG if not file.exists()]), moved

@@ -30,9 +30,9 @@ MODEL = {
     "kin.units",
 }
 RULES: dict[str, set[str]] = {
-    "kin": {"kin", "numpy", "numba"},
+    "kin": {"kin", "numpy"},
     "kin/parsing.py": {"tomli_w", "kin.errors"},
-    "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
+    "kin/kernels": {"numpy", "kin.kernels", "kin.tolerances", "kin.transforms"},
     # Only `kin.generate`, when it is called, imports it: no service does.
     "kin/codegen": {"numpy", "kin._version", "kin.codegen", "kin.ik", "kin.kernels", "kin.solvers", *MODEL},
     "kin/calibration": {"numpy", "kin.calibration", "kin.collision", "kin.ik", *MODEL},
@@ -93,11 +93,11 @@ RULES: dict[str, set[str]] = {
     # A program's end of the line needs nothing of the service.
     "app/live/client": {"kin", "numpy", "websockets", "app.live.client", "app.live.recording"},
     "app/live/recording": {"kin", "lz4", "mcap", "numpy", "zstandard", "app.live.recording"},
-    "app/bench": {"kin", "numpy", "numba", "app.bench"},
+    "app/bench": {"kin", "numpy", "app.bench"},
     # A page of a recorded run needs neither the core nor other libraries.
     "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},
     "app/bench/contestants": {
-        *("kin", "numpy", "numba", "app.bench"),
+        *("kin", "numpy", "app.bench"),
         *(
             "coal",
             "eaik",

@@ -18,8 +18,7 @@ from app.bench.contestants import PEERS, Peer
 from app.bench.rows import ROWS, Row
 from app.bench.run import Settings, run
 from kin import InputError
-from kin.kernels.ahead import CHOSEN, NUMBA
-from kin.kernels.fk import fk_one
+from kin.kernels.compile import PLAIN
 
 INSTALL = "pip install 'kinboard[bench]'"
 _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
@@ -36,8 +35,8 @@ def bench(arguments: Namespace) -> int:
     if arguments.cpu_time:
         settings = replace(settings, clock=time.process_time_ns)
     files = [_file(name, getattr(arguments, name)) for name in ("json", "picture", "html")]
-    if CHOSEN != NUMBA or not hasattr(fk_one, "py_func"):  # an attribute of compiled functions only
-        return _refuse("the floors need numba: unset KINBOARD_KERNELS and NUMBA_DISABLE_JIT")
+    if PLAIN:
+        return _refuse("kernels run as plain Python: unset KINBOARD_KERNELS")
     missing = [peer.name for peer in settings.peers if not peer.installed]
     if missing and arguments.peers:
         words = [INSTALL, *(peer.name for peer in settings.peers if not peer.extra)]

@@ -47,16 +47,16 @@ class Verdict:
 
 GATES: tuple[Gate, ...] = (
     Gate("fk", OURS, 6.0),
-    Gate("fk-batch", OURS, 1.5),
-    Gate("workspace", OURS, 0.5),
+    Gate("fk-batch", OURS, 0.5),
+    Gate("workspace", OURS, 0.25),
     Gate("ik-pioneer5", OURS, 10.0),
     Gate("ik-pioneer5", SOLVE_IK, 260.0),
-    Gate("ik-pioneer5-batch", OURS, 4.0),
+    Gate("ik-pioneer5-batch", OURS, 2.0),
     Gate("ik-srs", OURS, 10.0),
-    Gate("ik-srs-batch", OURS, 2.5),
-    Gate("ik-puma560-batch", OURS, 3.0),
-    Gate("ik-ur5-batch", OURS, 3.0),
-    Gate("collision", OURS, 22.0),
+    Gate("ik-srs-batch", OURS, 1.2),
+    Gate("ik-puma560-batch", OURS, 2.0),
+    Gate("ik-ur5-batch", OURS, 2.0),
+    Gate("collision", OURS, 12.0),
     Gate("solve-redundant7-craig", SOLVE_IK, 360.0),
 )
 

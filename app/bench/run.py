@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numba
 import numpy as np
 
 import kin
@@ -266,6 +265,5 @@ def machine() -> dict[str, str]:
         "system": f"{platform.system()} {platform.release()}",
         "python": sys.version.split()[0],
         "numpy": np.__version__,
-        "numba": numba.__version__,
         "kinboard": kin.__version__,
     }

@@ -1,6 +1,6 @@
 """Translates the kernels of an arm to C and JavaScript, for those who have no Python.
 
-The very kernels that are compiled by numba, and tested, are read as source:
+The very kernels that Kinboard runs are read as source:
 
 1. :mod:`~kin.codegen.typing` turns them into typed trees, kernel by kernel and callees first. The subset of
    Python is small and closed (:mod:`~kin.codegen.subset`): what is outside is refused with file, line and what to

@@ -1,6 +1,6 @@
 """The kernels that generated code calls, in the subset: what `kin.solve_ik` does of one target without words.
 
-They are never compiled by numba. A closed form enters as two kernels: `rows`, one of those of
+They are translated only. A closed form enters as two kernels: `rows`, one of those of
 :mod:`kin.codegen.families`, and what it calls.
 """
 

@@ -15,9 +15,9 @@ import numpy as np
 from kin._version import __version__
 from kin.codegen import c, entries, js
 from kin.codegen.arm import Arm, arm_of
+from kin.codegen.fingerprint import fingerprint
 from kin.codegen.vectors import c_test
 from kin.errors import InputError
-from kin.kernels.sources import fingerprint
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array

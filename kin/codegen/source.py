@@ -87,7 +87,7 @@ def decorators(function: FunctionType) -> set[str]:
 
 
 def is_inlined(function: FunctionType) -> bool:
-    """Whether numba compiles a kernel into its callers, so that their loops are vectorised."""
+    """Whether a kernel is compiled into its callers, so that their loops are vectorised."""
     return bool(decorators(function) & _INLINED)
 
 

@@ -1,4 +1,4 @@
-"""The types of the subset of Python that kernels are written in, as numba sees them."""
+"""The types of the subset of Python that kernels are written in."""
 
 from __future__ import annotations
 

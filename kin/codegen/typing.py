@@ -1,6 +1,6 @@
 """From the source of kernels to typed trees.
 
-A kernel is typed once for each combination of argument types that it is called with, as numba does it. A function
+A kernel is typed once for each combination of argument types that it is called with. A function
 passed as an argument is part of the type, so that every closure is resolved here. Types of variables are found by
 passes over the body until none changes.
 """

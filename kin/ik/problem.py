@@ -288,7 +288,7 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
 
 @cache
 def _straighten() -> Callable[[Array, float, Array], float]:
-    """`straighten` without type dispatch."""
+    """`straighten`, which checks its arrays."""
     return direct(straighten, _POSE, float, _POSE)
 
 

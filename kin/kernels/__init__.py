@@ -1,1 +1,1 @@
-"""Compiled loops: compilation and caching, vectorised trigonometry, forward kinematics, input checks."""
+"""Kernels: how they are called and loaded, vectorised trigonometry, kinematics, small matrices, input checks."""

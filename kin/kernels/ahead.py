@@ -1,11 +1,9 @@
-"""Kernels that were compiled before the program began: the extension `kin._kernels`.
+"""The extension `kin._kernels`: kernels that were compiled before the program began.
 
-KINBOARD_KERNELS says what kernels are: ``numba`` (the default) compiles them on first use, ``c`` calls the
-extension, ``python`` runs them as they are written, for debugging and for a command that computes one pose.
-
-A wheel has the extension beside the package, one file for each level of processors. In a checkout it is built when
-it is first needed (:mod:`kin.codegen.extension.build`), and again when a file of the core has changed, which takes
-seconds; it is kept in `extension` in the user's cache folder, which nobody else may change.
+A wheel has the extension beside the package, one file for each level of processors. In a checkout it is built
+when it is first needed (:mod:`kin.codegen.extension.build`), and again when a file of the core has changed, which
+takes seconds; it is kept in `extension` in the user's cache folder, which nobody else may change. One process
+builds, and others that need the extension meanwhile wait for it.
 """
 
 from __future__ import annotations
@@ -14,72 +12,29 @@ import contextlib
 import hashlib
 import os
 import platform
+import stat
 import subprocess
 import sys
 import sysconfig
+import time
 from collections.abc import Callable, Iterator
-from functools import cache, cached_property, update_wrapper
+from functools import cache
 from importlib.machinery import ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
 from kin.kernels import layout
-from kin.kernels.sources import shared_with, user_folder
-from kin.transforms import is_plain
 
-NUMBA, C, PYTHON = "numba", "c", "python"
 BUILDER = "kin.codegen.extension.build"
+WITHOUT = "KINBOARD_KERNELS=python runs without compiled kernels, a thousand times slower"
+WAIT = 2.0  # s for another process, after which it is said
 _CORE = Path(__file__).parents[1]
 _DTYPES = ("f8", "i8", "?", "u8", "f4", "c16")  # in the order of `items` in module.c
 # What NumPy calls the instructions of a level of processors; those of v2 are in each that NumPy runs on.
 _FEATURES = {"v4": ("AVX512_SKX",), "v3": ("AVX2", "FMA3")}
-
-
-def _chosen() -> str:
-    uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
-    found = os.environ.get("KINBOARD_KERNELS") or (PYTHON if uncompiled else NUMBA)
-    if found not in (NUMBA, C, PYTHON):
-        raise ValueError(f"KINBOARD_KERNELS={found}: it is one of {NUMBA}, {C}, {PYTHON}")
-    return found
-
-
-CHOSEN: Final = _chosen()
-
-
-class Wanted(NamedTuple):
-    """An array as a kernel wants it: its shape, None for an axis of any length, and what it has in it.
-
-    Attributes:
-        checked: whether it is checked before a call where the kernel does not do it.
-    """
-
-    shape: tuple[int | None, ...]
-    checked: bool = True
-    item: type = float
-
-
-class Kernel:
-    """A kernel of the extension. One that Python never calls has no entry there, and is called as it is written.
-
-    Attributes:
-        py_func: the function itself.
-    """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.py_func = function
-        self.name = f"{function.__module__}.{function.__qualname__}"
-        update_wrapper(self, function)
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self._call(*arguments)
-
-    @cached_property
-    def _call(self) -> Callable[..., Any]:
-        entry = entries().get(self.name)
-        return self.py_func if entry is None else entry.function(())
 
 
 class Entry(NamedTuple):
@@ -95,6 +50,17 @@ class Entry(NamedTuple):
         return found
 
 
+@cache
+def entries() -> dict[str, Entry]:
+    """The entries of the extension by the names of their kernels.
+
+    Raises:
+        ImportError: there is no extension, and it cannot be built; says what to do.
+    """
+    module = loaded(_file())
+    return {name: Entry(module, k, takes) for k, (name, takes, _) in enumerate(module.entries())}
+
+
 def loaded(file: Path, readable: bool = layout.READABLE) -> Any:
     """The extension in a file.
 
@@ -105,7 +71,7 @@ def loaded(file: Path, readable: bool = layout.READABLE) -> Any:
         ImportError: objects of this Python are others than those that it is compiled for.
     """
     if sysconfig.get_config_var("Py_GIL_DISABLED"):
-        raise ImportError("compiled kernels need a Python with a GIL: set KINBOARD_KERNELS=numba, or python")
+        raise ImportError(f"compiled kernels need a Python with a GIL; {WITHOUT}")
     spec = spec_from_file_location("kin._kernels", file, loader=ExtensionFileLoader("kin._kernels", str(file)))
     assert spec is not None
     assert spec.loader is not None
@@ -113,17 +79,6 @@ def loaded(file: Path, readable: bool = layout.READABLE) -> Any:
     spec.loader.exec_module(module)
     module.set_up(np.ndarray, np.bool_, np.empty, tuple(map(np.dtype, _DTYPES)), readable)
     return module
-
-
-@cache
-def entries() -> dict[str, Entry]:
-    """The entries of the extension by the names of their kernels.
-
-    Raises:
-        ImportError: there is no extension, and it cannot be built; says what to do.
-    """
-    module = loaded(_file())
-    return {name: Entry(module, k, takes) for k, (name, takes, _) in enumerate(module.entries())}
 
 
 def levels() -> Iterator[str]:
@@ -145,9 +100,7 @@ def _file() -> Path:
         if (packaged := _CORE / f"_kernels_{level}.{suffix}").exists():
             return packaged
     if not (_CORE.parent / "pyproject.toml").exists():
-        raise ImportError(
-            "this installation has no compiled kernels for the processor: set KINBOARD_KERNELS=numba"
-        )
+        raise ImportError(f"this installation has no compiled kernels for the processor; {WITHOUT}")
     return built(_CORE, next(levels()))
 
 
@@ -155,47 +108,125 @@ def built(core: Path, level: str) -> Path:
     """The extension of a checkout, built again if a file of its core has changed since the last time.
 
     Raises:
-        ImportError: it cannot be built, and what the compiler says is on the standard error; or others may change
-            the folder where it is kept.
+        ImportError: it cannot be built; says why, or that others may change the folder where it is kept.
     """
     folder = _folder()
-    index = folder / f"{_hash(str(core))}-{level}.txt"
-    state = _state(core)
-    if index.exists():
-        known, _, name = index.read_text("utf-8").partition("\n")
-        if known == state and _is_within(folder, file := folder / name):
-            with contextlib.suppress(OSError):  # a folder that is only read
-                os.utime(file)  # they are used
-                os.utime(index)
-            return file
-    command = [sys.executable, "-m", BUILDER, str(folder), "--level", level]
-    environment = os.environ | {"KINBOARD_KERNELS": PYTHON, "PYTHONPATH": str(core.parent)}
-    ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=False)
-    if ran.returncode:
-        raise ImportError("kernels cannot be compiled (see above): set KINBOARD_KERNELS=numba, or python")
-    file = Path(ran.stdout.strip())
-    beside = index.with_name(f"{index.name}.{os.getpid()}")
-    beside.write_text(f"{state}\n{file.relative_to(folder)}", "utf-8")
-    beside.replace(index)
+    index = folder / f"{key_of(str(core))}-{level}.txt"
+    if (found := _known(folder, index, _state(core))) is not None:
+        return found
+    with _alone(folder):
+        state = _state(core)
+        if (found := _known(folder, index, state)) is not None:  # by another process, meanwhile
+            return found
+        # -P: the core in the working folder may be another one.
+        command = [sys.executable, "-P", "-m", BUILDER, str(folder), "--level", level]
+        environment = os.environ | {"KINBOARD_KERNELS": "python", "PYTHONPATH": str(core.parent)}
+        ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=False)
+        said = ran.stdout.strip()
+        if ran.returncode:
+            raise ImportError(f"{said or 'kernels cannot be compiled (see above)'}; {WITHOUT}")
+        beside = index.with_name(f"{index.name}.{os.getpid()}")
+        beside.write_text(f"{state}\n{Path(said).relative_to(folder)}", "utf-8")
+        beside.replace(index)
+        return Path(said)
+
+
+def _known(folder: Path, index: Path, state: str) -> Path | None:
+    """The extension that an index names, if it was built from what the core is now."""
+    if not index.exists():
+        return None
+    built_from, _, name = index.read_text("utf-8").partition("\n")
+    file = folder / name
+    if built_from != state or not (file.is_file() and file.resolve().is_relative_to(folder.resolve())):
+        return None
+    with contextlib.suppress(OSError):  # a folder that is only read
+        os.utime(file)  # they are used
+        os.utime(index)
     return file
 
 
 def _folder() -> Path:
     """The folder of extensions, made if it is missing."""
-    hint = "set KINBOARD_CACHE to another folder"
     try:
         folder = user_folder() / "extension"
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        owned = shared_with(folder, 0o022, owners=frozenset({0}))
+        owned = _shared_with(folder)
     except (OSError, RuntimeError) as error:
-        raise ImportError(f"there is no folder to keep compiled kernels in: {error}; {hint}") from error
+        raise _no_folder(error) from error
     if owned:
-        raise ImportError(f"{folder} may be changed by others ({owned}): chmod 700, or {hint}")
+        raise ImportError(f"{folder} may be changed by others ({owned}): chmod 700, or {_ELSEWHERE}")
     return folder
 
 
-def _is_within(folder: Path, file: Path) -> bool:
-    return file.is_file() and file.resolve().is_relative_to(folder.resolve())
+_ELSEWHERE = "set KINBOARD_CACHE to another folder"
+
+
+def _no_folder(error: Exception) -> ImportError:
+    return ImportError(f"there is no folder to keep compiled kernels in: {error}; {_ELSEWHERE}")
+
+
+def _shared_with(folder: Path) -> str:
+    """Who besides this user may change a folder, as its owner and mode; empty: nobody.
+
+    Code from a folder that others may change is not executed. A link counts as a folder of others.
+    """
+    found = folder.lstat()
+    if sys.platform == "win32":  # there, the user's cache folder is private by its access list
+        return ""
+    private = stat.S_ISDIR(found.st_mode) and not found.st_mode & 0o022
+    return (
+        ""
+        if private and found.st_uid in {os.geteuid(), 0}
+        else f"owner {found.st_uid}, {stat.filemode(found.st_mode)}"
+    )
+
+
+def user_folder() -> Path:
+    """The user's cache folder for Kinboard, that of `platformdirs`, which the core does without."""
+    if named := os.environ.get("KINBOARD_CACHE"):
+        return Path(named)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "kinboard" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "kinboard"
+    return Path(os.environ.get("XDG_CACHE_HOME", "").strip() or Path.home() / ".cache") / "kinboard"
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Within the context no other process builds in a folder. The system ends the lock of a process that dies."""
+    try:
+        file = (folder / "lock").open("ab")
+    except OSError as error:
+        raise _no_folder(error) from error
+    with file:
+        started, waits = time.monotonic(), False
+        while not _locked(file):
+            if not waits and time.monotonic() - started > WAIT:
+                waits = True
+                print("Kinboard waits for another process that compiles its kernels", file=sys.stderr, flush=True)
+            time.sleep(0.05)
+        yield
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _locked(file: IO[bytes]) -> bool:
+        """Lock a file until it is closed, unless another process has locked it."""
+        with contextlib.suppress(OSError):
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            return True
+        return False
+else:
+    import fcntl
+
+    def _locked(file: IO[bytes]) -> bool:
+        """Lock a file until it is closed, unless another process has locked it."""
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        return False
 
 
 def _state(core: Path) -> str:
@@ -207,45 +238,9 @@ def _state(core: Path) -> str:
             if each.name in files:
                 with contextlib.suppress(FileNotFoundError):  # a link to nothing, as editors make
                     found.append((each.path, each.stat().st_mtime_ns))
-    return _hash(sorted(found))
+    return key_of(sorted(found))
 
 
-def _hash(*parts: object) -> str:
+def key_of(*parts: object) -> str:
+    """A name for what depends on some values."""
     return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
-
-
-def direct(kernel: Kernel, wanted: list[Wanted | None]) -> Callable[..., Any]:
-    """The entry of a kernel that demands the shapes of its arrays; None stands for a number.
-
-    Raises:
-        ImportError: the extension has no such entry, or for arrays with other numbers of axes.
-    """
-    shapes = [each.shape for each in wanted if each is not None]
-    entry = entries().get(kernel.name)
-    if entry is None or [int(each) for each in entry.takes if each.isdigit()] != list(map(len, shapes)):
-        raise ImportError(f"the extension has no entry {kernel.name} for arrays with {[*map(len, shapes)]} axes")
-    return entry.function(tuple(-1 if n is None else n for shape in shapes for n in shape))
-
-
-def checked(function: Callable[..., Any], wanted: list[Wanted | None]) -> Callable[..., Any]:
-    """A function that checks the arrays that it is given as an entry does."""
-
-    def call(*arguments: Any) -> Any:
-        for value, array in zip(_flat(arguments), wanted, strict=True):
-            if array is not None and array.checked and not fits(value, array.shape):
-                raise TypeError(f"{value!r} is not a C-contiguous float64 array {array.shape}")
-        return function(*arguments)
-
-    return call
-
-
-def _flat(arguments: tuple[Any, ...]) -> Iterator[Any]:
-    for each in arguments:
-        yield from _flat(each) if isinstance(each, tuple) else (each,)
-
-
-def fits(value: object, shape: tuple[int | None, ...]) -> bool:
-    """Whether a value is a C-contiguous array of floats with this shape."""
-    if not is_plain(value) or value.ndim != len(shape):
-        return False
-    return all(wanted in (None, there) for wanted, there in zip(shape, value.shape, strict=True))

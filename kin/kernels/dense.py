@@ -1,6 +1,6 @@
 """Dense linear algebra of matrices with a few rows, for kernels: Cholesky, elimination, QR and singular values.
 
-numba's own functions call LAPACK, whose calls take longer than all the work on a 6×6 matrix, and make new arrays.
+NumPy's functions call LAPACK, whose calls take longer than all the work on a 6×6 matrix, and make new arrays.
 These overwrite their arguments instead (Golub and Van Loan, Matrix Computations, 4th edition, sections 3.4, 4.2,
 5.2 and 8.6).
 """

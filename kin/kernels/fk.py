@@ -93,7 +93,7 @@ def _load(T: Array, model: Array, start: int) -> None:
 
 @jit
 def copy_pose(T: Array, out: Array) -> None:
-    """out ← T for 4×4 arrays, as a loop: numba takes seconds to compile an array assignment."""
+    """out ← T for 4×4 arrays."""
     for r in range(4):
         for c in range(4):
             out[r, c] = T[r, c]

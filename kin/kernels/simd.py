@@ -1,4 +1,4 @@
-"""Branch-free sine, cosine and arc tangent, so that LLVM vectorises loops over them.
+"""Branch-free sine, cosine and arc tangent, so that compilers vectorise loops over them.
 
 The C library's ``sin`` is one call per value; a polynomial is a dozen multiplications, done on four or eight
 values at once. Every choice is a select, never a jump, and strict floating point is kept: NaN stays NaN, and a
@@ -13,29 +13,18 @@ single value gives the same bits as the same value inside a vector.
 
 Measured on millions of values, the error of sine and cosine is at most 1.1 ulp for |x| ≤ 1, 1.5 ulp for |x| ≤ 1000
 and 2.3 ulp for |x| ≤ `WIDE`; that of the arc tangent is at most 2.4 ulp.
+
+As they are written here, kernels call them with KINBOARD_KERNELS=python. The extension has the same operations in
+``kin/codegen/runtime.h``, and so the same bits.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+import struct
+import sys
 
-from kin.kernels import plain
-from kin.kernels.ahead import CHOSEN, NUMBA
-from kin.kernels.compile import PLAIN, inlined
-
-if CHOSEN == NUMBA:
-    from numba import types
-    from numba.extending import intrinsic
-
-
-def _unchanged(function: Any) -> Any:
-    return function
-
-
-# Decorator for functions that emit LLVM instructions.
-_build: Callable[[Any], Any] = intrinsic if CHOSEN == NUMBA else _unchanged
+from kin.kernels.compile import inlined
 
 WIDE = 1e5  # rad; up to here the error of subtracting k·π/2 is negligible
 
@@ -46,59 +35,39 @@ _HALF_PI_REST = 6.123233995736766e-17
 _QUARTER_PI = 0.7853981633974483
 _QUARTER_PI_REST = 3.061616997868383e-17
 _TAN_PI_8 = 0.41421356237309503
+_WORD = (1 << 64) - 1
+
+if sys.version_info >= (3, 13):
+    _fused = math.fma
+else:
+
+    def _fused(a: float, b: float, c: float) -> float:
+        (p, q), (r, s), (t, u) = a.as_integer_ratio(), b.as_integer_ratio(), c.as_integer_ratio()
+        exact = p * r * u + t * q * s
+        return exact / (q * s * u) if exact else a * b + c  # which has the right sign
 
 
-@_build
-def fma(typing: Any, a: Any, b: Any, c: Any) -> Any:
-    """a·b + c, rounded once if the processor has the instruction."""
-    del typing, a, b, c
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        double = arguments[0].type
-        kind = type(builder.function.function_type)(double, [double] * 3)
-        return builder.call(builder.module.declare_intrinsic("llvm.fmuladd", [double], kind), arguments)
-
-    return types.float64(types.float64, types.float64, types.float64), build
+def fma(a: float, b: float, c: float) -> float:
+    """a·b + c, rounded once. On x86-64-v2, which lacks this, the extension rounds the product too."""
+    a, b, c = float(a), float(b), float(c)
+    try:
+        return _fused(a, b, c)
+    except (ArithmeticError, ValueError):  # an infinity or NaN
+        return c if math.isfinite(a) and math.isfinite(b) and not math.isfinite(c) else a * b + c
 
 
-@_build
-def widest(typing: Any) -> Any:
-    """Called in a kernel, allows its loops the widest vectors of the processor.
-
-    By default LLVM stops at 256 bits on processors that lower their clock for 512; purely arithmetic loops are a
-    third faster with 512 even so.
-    """
-    del typing
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        attributes = builder.function.attributes
-        if isinstance(attributes, set):
-            set.add(attributes, '"prefer-vector-width"="512"')  # its own add() rejects attributes with values
-        return context.get_dummy_value()
-
-    return types.none(), build
+def widest() -> None:
+    """Called in a kernel, allows its loops the widest vectors of the processor."""
 
 
-@_build
-def bits_of(typing: Any, x: Any) -> Any:
+def bits_of(x: float) -> int:
     """The 64 bits of a float as an integer."""
-    del typing, x
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], context.get_value_type(types.int64))
-
-    return types.int64(types.float64), build
+    return int(struct.unpack("<q", struct.pack("<d", x))[0])
 
 
-@_build
-def float_of(typing: Any, bits: Any) -> Any:
-    """The float of 64 bits."""
-    del typing, bits
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], context.get_value_type(types.float64))
-
-    return types.float64(types.int64), build
+def float_of(bits: int) -> float:
+    """The float of the lowest 64 bits of an integer."""
+    return float(struct.unpack("<d", struct.pack("<Q", bits & _WORD))[0])
 
 
 @inlined
@@ -188,16 +157,3 @@ def wrapped(angle: float) -> float:
     up = angle + _TURN
     angle = down if angle > math.pi else angle
     return up if angle <= -math.pi else angle
-
-
-if PLAIN or CHOSEN != NUMBA:
-    # LLVM intrinsics cannot be called from Python: use the library functions.
-
-    def sin_cos(x: float) -> tuple[float, float]:
-        return math.sin(x), math.cos(x)
-
-    def atan2(y: float, x: float) -> float:
-        return math.atan2(y, x)
-
-    fma, widest = (lambda a, b, c: a * b + c), (lambda: None)
-    bits_of, float_of = plain.bits_of, plain.float_of

@@ -224,7 +224,7 @@ def unbounded(n: int) -> Array:
 
 @inlined
 def rows_of(params: Array, first: int) -> Entries:
-    """Twelve numbers of params: read before a loop, as it might write there for all LLVM knows."""
+    """Twelve numbers of params: read before a loop, as it might write there for all the compiler knows."""
     p, i = params, first
     return (
         p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5], p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10],

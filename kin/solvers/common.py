@@ -173,7 +173,7 @@ def circular_clamp(value: float, low: float, high: float) -> float:
 
 @jit
 def clear(out: Array) -> None:
-    """out ← NaN everywhere ``(k, m)``. A loop, because numba takes seconds to compile an array assignment."""
+    """out ← NaN everywhere ``(k, m)``."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = math.nan

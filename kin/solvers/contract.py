@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from kin.angles import apart
 from kin.fk import fk, jacobian
-from kin.kernels.compile import counted, direct
+from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers.names import Names
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -158,9 +158,8 @@ class BatchKernels:
     seeded: Callable[[Array, Array, Array, Array, Array, Array], None] | None = field(default=None, kw_only=True)
 
     def unchecked(self) -> BatchKernels:
-        """The same without type dispatch, see `kin.kernels.compile.direct`; `one` raises `TypeError`."""
-        # `many` shares the machine code of calls with dispatch, which takes longer to compile than is saved here.
-        many = direct(self.many, *map(counted, (1, 3, 1, 1, 3)))
+        """The same, whose arrays are checked (`kin.kernels.compile.direct`): another one is a `TypeError`."""
+        many = direct(self.many, 1, 3, 1, 1, 3)
         return replace(self, one=direct(self.one, 1, (4, 4), float, 1, 2), many=many)
 
 

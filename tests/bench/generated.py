@@ -2,7 +2,7 @@
 
 One arm of each family. The same entry (all postures inside the limits, at their nearest whole turns, each checked
 by forward kinematics, sorted by the seed) solves the same targets as C (``--cc``) and as JavaScript (the Node
-of Playwright), beside the kernels as numba compiles them, for arms without a redundancy parameter or with a given
+of Playwright), beside the kernels of the core, for arms without a redundancy parameter or with a given
 one, and beside `kin.solve_ik`; times are processor time, least of some passes. Machine code and the stack of the
 deepest chain of calls are those of ``gcc -Os``; ``-m32 -msoft-float`` stands for a microcontroller that computes
 with floats in software.
@@ -33,7 +33,7 @@ import numpy as np
 from playwright._impl._driver import compute_driver_executable
 
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS.parent), str(TESTS / "kin" / "codegen")]
+sys.path[:0] = [str(TESTS.parent), str(TESTS), str(TESTS / "kin" / "codegen")]
 
 from emitted import ROBOTS, Built, targets  # noqa: E402
 

@@ -198,7 +198,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
     machine = document["machine"]
     cores = f"{machine['cores']} cores" + (f", load {machine['load']}" if machine.get("load") else "")
     own = ("kinboard", "numpy", "numba")
-    versions = [f"{name} {machine[name]}" for name in own]
+    versions = [f"{name} {machine[name]}" for name in own if name in machine]  # older runs: numba
     versions += [f"{name} {value}" for name, value in document["versions"].items() if name not in own]
     found = [
         ("Date", machine["time"]),

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import hashlib
 import importlib.util
+import math
 import os
 import re
 import shutil
@@ -30,9 +30,9 @@ from pathlib import Path
 
 from kin.codegen import units
 from kin.codegen.extension import wrappers
+from kin.codegen.fingerprint import file_of, fingerprint
 from kin.codegen.source import OutsideSubsetError
-from kin.kernels.ahead import levels
-from kin.kernels.sources import file_of, fingerprint
+from kin.kernels.ahead import key_of, levels
 
 HERE = Path(__file__).parent
 # Rounding is that of the kernels. Without `-fno-math-errno` loops that take square roots are not vectorised.
@@ -53,6 +53,7 @@ LEVELS: Mapping[str, tuple[str, ...]] = {
 LINUX, MACOS, WINDOWS = "linux-gnu.2.17", "macos.11.0", "windows-gnu"
 _LINKED: Mapping[str, tuple[str, ...]] = {LINUX: ("-lm",), MACOS: ("-Wl,-undefined,dynamic_lookup",), WINDOWS: ()}
 UNUSED = 30 * 86400.0  # s: what is kept and was not used for so long is removed
+SILENT = 10.0  # s without a line in a log
 # What is kept, by its place in the folder, where there may be other files: texts, objects, extensions, and what
 # `kin.kernels.ahead` notes of them.
 _HASH = "[0-9a-f]{32}"
@@ -111,7 +112,7 @@ def texts(folder: Path, say: Say) -> Iterator[tuple[str, str]]:
             say(f"translating {name}")
             beside.write_text(wrappers.unit(name, map(units.entry_of, lines)), "utf-8")
 
-        yield name, _kept(folder / f"{_hash(own, depends, lines)}.c", make).read_text("utf-8")
+        yield name, _kept(folder / f"{key_of(own, depends, lines)}.c", make).read_text("utf-8")
 
 
 def build(made: Iterable[tuple[str, str]], folder: Path, level: str, system: str, say: Say) -> Path:
@@ -137,7 +138,7 @@ def build(made: Iterable[tuple[str, str]], folder: Path, level: str, system: str
             source.write_text(text, "utf-8")
             _run([*clang, *options, "-c", str(source), "-o", str(beside)])
 
-        return str(_kept(folder / "objects" / f"{_hash(version, options, text)}.o", make))
+        return str(_kept(folder / "objects" / f"{key_of(version, options, text)}.o", make))
 
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         running = []
@@ -147,7 +148,7 @@ def build(made: Iterable[tuple[str, str]], folder: Path, level: str, system: str
         module = module_of(names)
         running.append(threads.submit(compiled, "module", module))
         objects = [each.result() for each in running]
-    library = folder / _hash(objects, system) / file_name(level, system)
+    library = folder / key_of(objects, system) / file_name(level, system)
     more = [*_LINKED[system], *(_imports(folder, module, level) if system == WINDOWS else ())]
     return _kept(library, lambda to: _run([*clang, *options, "-shared", "-s", *objects, *more, "-o", str(to)]))
 
@@ -208,33 +209,32 @@ def prune(folder: Path) -> None:
                     file.unlink()
 
 
-def _hash(*parts: object) -> str:
-    return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
-
-
 def main() -> int:
-    """Build, and print where the extension is."""
+    """Build, and print where the extension is, or why there is none."""
     parser = argparse.ArgumentParser(prog="python -m kin.codegen.extension.build", description=__doc__)
     parser.add_argument("folder", type=Path, help="where it is put, with what is needed to build it again quickly")
     parser.add_argument("--level", choices=LEVELS, default=next(levels()), help="processors (default: this one)")
     parser.add_argument("--system", choices=_LINKED, default=own_system(), help="(default: this one)")
     given = parser.parse_args()
-    started, ended = time.monotonic(), "\r" if sys.stderr.isatty() else "\n"
+    started, terminal, said = time.monotonic(), sys.stderr.isatty(), -math.inf
 
     def say(what: str) -> None:
-        print(
-            f"Kinboard's kernels, {time.monotonic() - started:.0f} s: {what:40}",
-            end=ended,
-            file=sys.stderr,
-            flush=True,
-        )
+        nonlocal said
+        now = time.monotonic()
+        if terminal or now - said > SILENT:  # several threads say something, and one line too many is no harm
+            said = now
+            line = f"Kinboard's kernels, {now - started:.0f} s: {what:40}"
+            print(line, end="\r" if terminal else "\n", file=sys.stderr, flush=True)
 
     try:
         print(build(texts(given.folder / "texts", say), given.folder, given.level, given.system, say))
         prune(given.folder)
     except (BuildError, OutsideSubsetError) as error:
-        print(f"\n{error}", file=sys.stderr)
+        print(error)
         return 1
+    finally:
+        if terminal and said > started - 1.0:
+            print(file=sys.stderr)
     return 0
 
 

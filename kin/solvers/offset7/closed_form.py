@@ -46,7 +46,7 @@ _OBSTACLES: dict[int, ObstacleCode] = {
 
 @cache
 def _answer() -> Callable[[Array, Array, Array, float, bool, float, Array, Array], int]:
-    """`answer` without type dispatch."""
+    """`answer`, which checks its arrays."""
     return direct(answer, 1, 2, 2, float, bool, float, 2, 2)
 
 

@@ -422,11 +422,11 @@ def _are_alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
 
 @cache
 def _ends() -> Callable[..., None]:
-    """`move_ends` without type dispatch."""
+    """`move_ends`, which checks its arrays."""
     return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 3, 3, 2, 1)
 
 
 @cache
 def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int]:
-    """`choose_rows` without type dispatch."""
+    """`choose_rows`, which checks its arrays."""
     return direct(choose_rows, MODEL, (4, 4), 1, 2, 2, 3, 2)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels.compile import MODEL, direct, record, row_of
+from kin.kernels.compile import MODEL, ROW, direct, record
 from kin.solvers.selfmotion.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.transforms import Array
 
@@ -44,5 +44,5 @@ class Motions:
 
 @cache
 def _trace() -> Callable[..., int]:
-    """`trace` without type dispatch."""
-    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(Paths, 2, row_of(int)), 2, 3)
+    """`trace`, which checks its arrays."""
+    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(2, ROW), 2, 3)

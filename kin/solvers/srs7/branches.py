@@ -162,7 +162,7 @@ def answer(
     arm: Array, T: Array, value: float, respect_limits: bool, free_roll: bool, joints: Array, arcs: Array,
     out: Array, gap: Array,
 ) -> int:  # fmt: skip
-    """`solve` without tuples, so that it can be called without type dispatch.
+    """`solve` with flat arguments, for `kin.kernels.compile.direct`.
 
     joints ``(3, 7)``: seed, lower and upper limits. gap ``(1,)`` ← the gap in metres. Returns 256 times the code,
     and the number of intervals added.

@@ -38,7 +38,7 @@ _THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
 
 @cache
 def _answer() -> Callable[[Array, Array, float, bool, bool, Array, Array, Array, Array], int]:
-    """`answer` without type dispatch."""
+    """`answer`, which checks its arrays."""
     return direct(answer, 1, 2, float, bool, bool, 2, 2, 2, 1)
 
 

@@ -10,13 +10,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from arms import random_table, with_slides
+from arms import made_up_arms, random_table, with_slides
 from numpy_arm import pose
 
 import kin
 from kin import Robot, Status
 from kin.solvers import family_of
-from kin.warmup import made_up_arms
 
 SAME = 1e-6  # radians or metres: two configurations that are one
 REGULAR = 1e-3  # smallest singular value of a configuration that counts

@@ -139,12 +139,13 @@ def why_not(about: dict[str, Any]) -> str:
 def section(found: dict[str, Any]) -> str:
     """What the page says about a run, with its heading."""
     about = found["run"]
+    numba = f", numba {about['numba']}" if "numba" in about else ""  # which compiled the kernels of older runs
     lines = [
         "## What it takes",
         "",
         f"Measured by `python tests/bench/evidence --times` on {about['time'][:10]}: {about['processor']}, "
         f"{about['cores']} cores, of which everything else used {about['others']:.2f}; {about['system']}, "
-        f"Python {about['python']}, NumPy {about['numpy']}, numba {about['numba']}, commit {about['commit']}. "
+        f"Python {about['python']}, NumPy {about['numpy']}{numba}, commit {about['commit']}. "
         f"Medians of {about['rounds']} rounds over {about['targets']} random configurations inside the limits, in "
         "one thread. An *answer* is that of `kin.solve_ik` without options: all postures in order, limits and "
         "reasons, each put through forward kinematics. *In a batch* is `kin.solve_ik_many` for as many targets as "

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from arms import MADE_UP, made_up_arms
 
 import kin
 from kin.codegen import families, files, wrappers
@@ -20,11 +21,10 @@ from kin.kernels.checks import straighten
 from kin.robot import Robot
 from kin.solvers.contract import POSE
 from kin.solvers.scaled import in_unit
-from kin.warmup import MADE_UP, made_up_arms
 
 STATUSES = ("solved", "approximate", "limits", "unmet", "orientation", "unreachable")
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
-# With these C computes what numba does, to the last bit: fused operations where the kernels ask for them alone.
+# With these C computes what the kernels do, to the last bit: fused operations where they ask for them alone.
 # The last makes gcc like clang, which does not define it.
 EXACT = ("-mfma", "-ffp-contract=off", "-fno-tree-vectorize", "-U__FP_FAST_FMA")
 
@@ -106,7 +106,7 @@ def compiled(arm: Arm, folder: Path, *options: str) -> Built:
 
 
 def exact(robot: kin.Robot, folder: Path, level: str) -> Built:
-    """A library that fuses as numba does, of functions that take little of the stack."""
+    """A library that fuses as the kernels do, of functions that take little of the stack."""
     return compiled(arm_of(robot, False), folder, level, "-Wstack-usage=4096", *EXACT)
 
 

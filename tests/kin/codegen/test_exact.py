@@ -1,4 +1,4 @@
-"""Generated C beside numba: the same bits."""
+"""Generated C beside the kernels of the core: the same bits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import ONE_OF_EACH_SOLVER
+from arms import ONE_OF_EACH_SOLVER, one_of_each_family
 from emitted import ROBOTS, STRICT, answer, exact, targets
 
 from kin import builtin_robots, fk, solve_ik
@@ -18,14 +18,13 @@ from kin.codegen.families import alone, without_limits
 from kin.kernels.compile import PLAIN
 from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE
-from kin.warmup import one_of_each_family
 
 QUICK = ("irb120", "pioneer5")
 ALL = [pytest.param(robot_id, marks=() if robot_id in QUICK else pytest.mark.full) for robot_id in ROBOTS]
 HAS_FMA = Path("/proc/cpuinfo").exists() and " fma " in Path("/proc/cpuinfo").read_text()
 
 
-@pytest.mark.skipif(not HAS_FMA, reason="numba uses fused operations only where the processor has them")
+@pytest.mark.skipif(not HAS_FMA, reason="kernels use fused operations only where the processor has them")
 @pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
 @pytest.mark.parametrize("robot_id", ALL)
 def test_c_computes_the_bits_of_the_compiled_kernels(robot_id, tmp_path):

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from constructs import REFUSED, RIGHT, RIGHT_IN_C, fresh
-from numba import njit
 from playwright._impl._driver import compute_driver_executable
 
 import kin
@@ -122,19 +121,3 @@ def test_no_module_loads_the_translator_before_it_is_called():
     ]
     assert importing == []
     assert "from kin.codegen.files import generate" in (root / "kin/__init__.py").read_text(encoding="utf-8")
-
-
-@pytest.mark.full
-def test_numba_means_the_same():
-    def compiled(function, done):
-        if function not in done:
-            names = {n: v for n, v in function.__globals__.items() if n in function.__code__.co_names}
-            scope = {n: compiled(v, done) if hasattr(v, "__code__") else v for n, v in names.items()}
-            done[function] = njit(error_model="numpy")(type(function)(function.__code__, scope, function.__name__))
-        return done[function]
-
-    done = {}
-    for kernel in RIGHT + RIGHT_IN_C:
-        assert np.array_equal(reference(compiled(kernel, done)), reference(kernel), equal_nan=True), (
-            kernel.__name__
-        )

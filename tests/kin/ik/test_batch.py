@@ -1,4 +1,4 @@
-"""`ik_branches` and its arithmetic, compared with single calls, with the solvers and with the C library."""
+"""`ik_branches`, compared with single calls and with the solvers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arms import CHAPTER_ARMS, reversed_at
-from numba import njit
 
 import kin
 from kin import InputError
 from kin.codegen.families import alone
 from kin.ik import batch, problem
 from kin.ik.answers import answer
-from kin.kernels import simd
 from kin.robot import Joint, Robot
 from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE, SolverInput
@@ -288,72 +286,6 @@ def test_threads_get_the_same_results_as_serial_calls(robot_id):
     with ThreadPoolExecutor(8) as pool:
         for one, other in zip(serial, pool.map(work, batches), strict=True):
             assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, other, strict=True))
-
-
-# Arithmetic
-
-
-@njit(error_model="numpy")
-def many_sin_cos(x, s, c):
-    for i in range(x.shape[0]):
-        s[i], c[i] = simd.sin_cos(x[i])
-
-
-@njit(error_model="numpy")
-def many_atan2(y, x, out):
-    for i in range(x.shape[0]):
-        out[i] = simd.atan2(y[i], x[i])
-
-
-def ulps(found, wanted):
-    """Largest error in units of the last place (ulp) of the reference value."""
-    return (np.abs(found - wanted) / np.spacing(np.abs(wanted))).max()
-
-
-@pytest.mark.parametrize("scale", [1e-300, 1e-8, 1.0, 10.0, 1e3, simd.WIDE])
-def test_sine_and_cosine_match_the_c_library(scale):
-    x = np.random.default_rng(6).uniform(-scale, scale, 400_000)
-    s, c = np.empty_like(x), np.empty_like(x)
-    many_sin_cos(x, s, c)
-    assert ulps(s, np.sin(x)) <= 3.0
-    assert ulps(c, np.cos(x)) <= 3.0
-
-
-def test_sine_and_cosine_near_multiples_of_a_right_angle():
-    k = np.arange(-60_000.0, 60_000.0)
-    for step in (0.0, 1e-12, -1e-7, 1e-3):
-        x = k * (math.pi / 2) + step
-        s, c = np.empty_like(x), np.empty_like(x)
-        many_sin_cos(x, s, c)
-        assert ulps(s, np.sin(x)) <= 3.0
-        assert ulps(c, np.cos(x)) <= 3.0
-
-
-def test_arc_tangent_matches_the_c_library():
-    rng = np.random.default_rng(7)
-    for spread in (0.0, 0.1, 3.0, 30.0):
-        x, y = rng.normal(size=(2, 400_000)) * 10 ** rng.uniform(-spread, spread, (2, 400_000))
-        out = np.empty_like(x)
-        many_atan2(y, x, out)
-        assert ulps(out, np.arctan2(y, x)) <= 3.0
-
-
-def test_arc_tangent_on_the_axes_and_of_zero():
-    y = np.array([0.0, 0.0, 0.0, -0.0, 1.0, -1.0, 1.0, -1.0, math.nan, 1.0])
-    x = np.array([0.0, 1.0, -1.0, -1.0, 0.0, 0.0, 1.0, -1.0, 1.0, math.nan])
-    wanted = np.array([0, 0, math.pi, math.pi, math.pi / 2, -math.pi / 2, math.pi / 4, -3 * math.pi / 4])
-    out = np.empty_like(x)
-    many_atan2(y, x, out)
-    assert out[:8] == pytest.approx(wanted, abs=1e-15)
-    assert np.isnan(out[8:]).all()
-
-
-def test_sine_and_cosine_of_nan_are_nan():
-    x = np.array([math.nan, math.inf, -math.inf] * 5)
-    s, c = np.empty_like(x), np.empty_like(x)
-    many_sin_cos(x, s, c)
-    assert np.isnan(s).all()
-    assert np.isnan(c).all()
 
 
 # -- solve_ik_many -----------------------------------------------------------------------------------------------

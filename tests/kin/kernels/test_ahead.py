@@ -1,21 +1,28 @@
-"""Which extension is loaded, when it is built again, and kernels without a compiler."""
+"""Which extension is loaded, when and by whom it is built again, and kernels without a compiler."""
 
 from __future__ import annotations
 
-import json
+import contextlib
 import os
 import stat
 import subprocess
 import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import platformdirs
+import platformdirs.macos
+import platformdirs.windows
 import pytest
 
 import kin
 from kin.kernels import ahead
-from kin.kernels.ahead import Wanted
+from kin.kernels import compile as chosen
+from kin.kernels.compile import Wanted, checked
 
 
 @pytest.fixture
@@ -34,9 +41,9 @@ def asked(monkeypatch):
     found = []
 
     def builder(command, **options):
-        assert command[1:3] == ["-m", ahead.BUILDER]
+        assert command[1:4] == ["-P", "-m", ahead.BUILDER]
         found.append(options["env"]["KINBOARD_KERNELS"])
-        file = Path(command[3]) / str(len(found)) / "_kernels.so"
+        file = Path(command[4]) / str(len(found)) / "_kernels.so"
         file.parent.mkdir(parents=True)
         file.touch()
         return SimpleNamespace(returncode=0, stdout=f"{file}\n")
@@ -69,7 +76,7 @@ def test_a_link_to_nothing_in_the_core_is_no_error(core, asked):
 
 def test_a_python_without_a_gil_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(ahead.sysconfig, "get_config_var", {"Py_GIL_DISABLED": 1}.get)
-    with pytest.raises(ImportError, match="need a Python with a GIL: set KINBOARD_KERNELS=numba"):
+    with pytest.raises(ImportError, match="need a Python with a GIL; KINBOARD_KERNELS=python"):
         ahead.loaded(tmp_path / "missing.so")
 
 
@@ -138,7 +145,7 @@ def test_where_there_is_no_folder_it_is_said_what_to_set(core, asked, tmp_path):
 
 def test_where_it_cannot_be_built_it_is_said_what_to_set(core, monkeypatch):
     monkeypatch.setattr(ahead.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=1, stdout=""))
-    with pytest.raises(ImportError, match="KINBOARD_KERNELS=numba"):
+    with pytest.raises(ImportError, match=r"see above.*KINBOARD_KERNELS=python"):
         ahead.built(core, "level")
 
 
@@ -160,38 +167,138 @@ def test_the_best_level_comes_first(monkeypatch, machine, features, expected):
 
 
 def test_plain_functions_check_arrays_as_compiled_ones_do():
-    total = ahead.checked(lambda a, x: a.sum() * x, [Wanted((2, None)), None])
+    total = checked(lambda a, x: a.sum() * x, [Wanted((2, None)), None])
     assert total(np.ones((2, 3)), 2.0) == 12.0
     for wrong in (np.ones((3, 2)), np.ones((2, 3), int), [[1.0], [2.0]], np.ones((2, 4))[:, ::2]):
         with pytest.raises(TypeError, match=r"array \(2, None\)"):
             total(wrong, 2.0)
 
 
-PROGRAM = """
-import json, sys
-import kin
-from kin.kernels.elsewhere import compile_elsewhere
-compile_elsewhere(lambda line: True)  # as a service does
-T = kin.fk("ur5", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-(cloud,) = kin.workspace.sample_workspace("ur5", 3)
-answers = [len(kin.solve_ik("ur5", T).solutions), cloud.points.tolist()]
-print(json.dumps([*answers, "numba" in sys.modules, "llvmlite" in sys.modules]))
+def test_another_value_than_c_and_python_is_refused(monkeypatch):
+    for value, plain in (("", False), ("c", False), ("python", True)):
+        monkeypatch.setenv("KINBOARD_KERNELS", value)
+        assert (chosen._chosen() == chosen.PYTHON) is plain
+    monkeypatch.setenv("KINBOARD_KERNELS", "numba")
+    with pytest.raises(ValueError, match="KINBOARD_KERNELS=numba: it is one of c, python"):
+        chosen._chosen()
+
+
+def test_who_needs_it_while_it_is_built_waits_and_says_so(core, asked, monkeypatch, capsys):
+    build, sleep, waits = ahead.subprocess.run, time.sleep, threading.Event()
+    monkeypatch.setattr(ahead, "WAIT", 0.0)
+    monkeypatch.setattr(ahead.time, "sleep", lambda seconds: (waits.set(), sleep(seconds)))
+    monkeypatch.setattr(ahead.subprocess, "run", lambda *a, **k: waits.wait(60) and build(*a, **k))
+    with ThreadPoolExecutor(2) as threads:
+        first, second = threads.map(lambda _: ahead.built(core, "level"), range(2))
+    assert first == second
+    assert len(asked) == 1
+    assert capsys.readouterr().err == "Kinboard waits for another process that compiles its kernels\n"
+
+
+def test_a_builder_that_was_killed_leaves_the_next_one_to_build(core, asked, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(ahead.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=-9, stdout=""))
+        with pytest.raises(ImportError, match="cannot be compiled"):
+            ahead.built(core, "level")
+    assert ahead.built(core, "level").exists()
+    assert len(asked) == 1
+
+
+def test_where_nothing_can_be_written_what_is_there_is_used(core, asked):
+    file = ahead.built(core, "level")
+    lock = file.parents[1] / "lock"
+    lock.unlink()
+    lock.mkdir()  # so that it cannot be opened, not even by root
+    assert ahead.built(core, "level") == file
+    (core / "new.py").touch()
+    with pytest.raises(ImportError, match=r"no folder to keep .*set KINBOARD_CACHE"):
+        ahead.built(core, "level")
+
+
+BUILDER = """
+import os, sys, time
+from pathlib import Path
+
+folder = Path(sys.argv[1])
+with (folder / "begun").open("a") as file:
+    file.write("once\\n")
+while not (folder / "go").exists():
+    time.sleep(0.01)
+(folder / "made.so").touch()
+print(folder / "made.so")
 """
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("kernels", "answer"), [("python", [False, False]), ("fortran", "one of numba, c, python")]
-)
-def test_numba_is_not_imported_where_nothing_needs_it(kernels, answer):
-    environment = os.environ | {"KINBOARD_KERNELS": kernels, "PYTHONPATH": str(Path(kin.__file__).parents[1])}
-    ran = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=False
+@pytest.fixture
+def others(core):
+    """A function that starts another process that needs the extension, which the builder above makes."""
+    build = core / "codegen" / "extension" / "build.py"
+    build.parent.mkdir(parents=True)
+    for folder in (core, build.parents[1], build.parent):
+        (folder / "__init__.py").touch()
+    build.write_text(BUILDER)
+    program = (
+        "import sys; from pathlib import Path; from kin.kernels import ahead\n"
+        "print(ahead.built(Path(sys.argv[1]), 'x'))"
     )
-    if isinstance(answer, str):
-        assert answer in ran.stderr
-        return
-    solutions, points, *imported = json.loads(ran.stdout)
-    (cloud,) = kin.workspace.sample_workspace("ur5", 3)
-    assert (solutions, imported) == (8, answer)
-    assert np.allclose(points, cloud.points, atol=1e-6)
+    path = str(Path(kin.__file__).parents[1])
+    with contextlib.ExitStack() as stack:
+
+        def start():
+            command = [sys.executable, "-c", program, str(core)]
+            environment = os.environ | {"PYTHONPATH": path}
+            process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+            stack.callback(process.kill)
+            return stack.enter_context(process)
+
+        yield start
+
+
+def wait_for(file):
+    while not file.exists():
+        time.sleep(0.01)
+
+
+@pytest.mark.full
+def test_processes_that_need_it_at_once_build_it_once(others, tmp_path):
+    folder = tmp_path / "cache" / "extension"
+    started = [others() for _ in range(3)]
+    wait_for(folder / "begun")
+    (folder / "go").touch()
+    assert {process.communicate(timeout=60)[0].strip() for process in started} == {str(folder / "made.so")}
+    assert (folder / "begun").read_text() == "once\n"
+
+
+@pytest.mark.full
+def test_a_process_that_is_killed_while_it_builds_does_not_block_others(others, tmp_path):
+    folder = tmp_path / "cache" / "extension"
+    killed = others()
+    wait_for(folder / "begun")
+    killed.kill()
+    killed.wait()
+    next_one = others()
+    while (folder / "begun").read_text() != "once\nonce\n":
+        time.sleep(0.01)
+    (folder / "go").touch()  # for both builders: that of the killed process goes on
+    assert next_one.communicate(timeout=60)[0].strip() == str(folder / "made.so")
+
+
+@pytest.mark.parametrize("xdg", [None, "", "/somewhere/cache"])
+def test_the_folder_is_that_of_platformdirs(monkeypatch, xdg):
+    monkeypatch.delenv("KINBOARD_CACHE", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    if xdg is not None:
+        monkeypatch.setenv("XDG_CACHE_HOME", xdg)
+    assert ahead.user_folder() == platformdirs.user_cache_path("kinboard", appauthor=False)
+
+
+@pytest.mark.parametrize(
+    ("platform", "of"), [("darwin", platformdirs.macos.MacOS), ("win32", platformdirs.windows.Windows)]
+)
+def test_so_it_is_on_other_systems(monkeypatch, platform, of):
+    monkeypatch.delenv("KINBOARD_CACHE", raising=False)
+    monkeypatch.setenv("LOCALAPPDATA", "/home/user/AppData/Local")
+    monkeypatch.setattr(platformdirs.windows, "get_win_folder", lambda name: "/home/user/AppData/Local")
+    expected = of("kinboard", appauthor=False).user_cache_dir.replace("\\", "/")
+    monkeypatch.setattr(sys, "platform", platform)
+    assert ahead.user_folder() == Path(expected)

@@ -1,4 +1,4 @@
-"""Real roots of polynomials, by brackets from the derivatives; numba kernels without allocation in loops."""
+"""Real roots of polynomials, by brackets from the derivatives: kernels without allocation in loops."""
 
 from __future__ import annotations
 

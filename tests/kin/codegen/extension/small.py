@@ -8,6 +8,7 @@ import numpy as np
 
 from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, SINGLE, WORD, ArrayOf, TupleOf
 from kin.codegen.units import Entry
+from kin.kernels import simd
 
 
 class Box(NamedTuple):
@@ -68,6 +69,21 @@ def wait(a, n):
     return k
 
 
+def sines(x, s, c):
+    for i in range(x.shape[0]):
+        s[i], c[i] = simd.sin_cos(x[i])
+
+
+def quarters(x, s, c):
+    for i in range(x.shape[0]):
+        s[i], c[i] = simd.sin_cos_quarters(x[i])
+
+
+def angles(y, x, out):
+    for i in range(x.shape[0]):
+        out[i] = simd.atan2(y[i], x[i])
+
+
 F1, F2 = ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2)
 KINDS = {
     numbers: (FLOAT, INT, BOOL, COMPLEX),
@@ -79,6 +95,9 @@ KINDS = {
     ramp: (INT, FLOAT),
     pair: (F1,),
     wait: (F1, INT),
+    sines: (F1, F1, F1),
+    quarters: (F1, F1, F1),
+    angles: (F1, F1, F1),
 }
 for _kernel in KINDS:
     _kernel.__module__ = "kin.small"  # names in C are those of modules of the core

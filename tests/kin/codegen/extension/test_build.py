@@ -112,7 +112,7 @@ def old(file, age=build.UNUSED + 60.0):
 
 @pytest.mark.parametrize("name", OWN)
 def test_what_is_used_no_more_is_removed(tmp_path, name):
-    first, second = (tmp_path / name.format(build._hash(k)) for k in (1, 2))
+    first, second = (tmp_path / name.format(ahead.key_of(k)) for k in (1, 2))
     old(first)
     old(second, build.UNUSED - 3600.0)
     build.prune(tmp_path)
@@ -122,7 +122,7 @@ def test_what_is_used_no_more_is_removed(tmp_path, name):
 
 @pytest.mark.parametrize("name", FOREIGN)
 def test_files_that_others_have_put_into_the_folder_stay(tmp_path, name):
-    file = tmp_path / name.format(build._hash(1))
+    file = tmp_path / name.format(ahead.key_of(1))
     old(file)
     for folder in file.relative_to(tmp_path).parents:
         os.utime(tmp_path / folder, (0.0, 0.0))

@@ -15,7 +15,8 @@ import small
 from kin.codegen.extension import build, wrappers
 from kin.kernels import ahead
 
-FLAGS = ("-std=c11", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-Wno-unused-function")
+# The fused operation is that of the library where the processor has none.
+FLAGS = ("-std=c11", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-Wno-unused-function", "-DFP_FAST_FMA")
 
 
 def compiled(folder, *options):
@@ -58,6 +59,20 @@ def test_numbers_and_tuples_come_back_as_python_has_them(module):
         4,
     )
     assert call(module, small.nothing)(1) is None
+
+
+def test_sines_and_angles_have_the_bits_of_python(module):
+    rng = np.random.default_rng(60)
+    x = (rng.uniform(-1.0, 1.0, (100, 8)) * 10.0 ** np.arange(-3.0, 5.0)).ravel()
+    x = np.concatenate([x, np.arange(-50.0, 50.0) * (np.pi / 2), [0.0, -0.0, 1e-310, np.nan, np.inf, -np.inf]])
+    y = rng.permutation(x)
+    for kernel, arguments in ((small.sines, (x,)), (small.quarters, (x,)), (small.angles, (y, x))):
+        found, wanted = np.empty((2, 3 - len(arguments), len(x)))
+        call(module, kernel)(*arguments, *found)
+        with np.errstate(invalid="ignore"):
+            kernel(*arguments, *wanted)
+        assert np.array_equal(found, wanted, equal_nan=True)
+        assert np.array_equal(np.signbit(found[found == 0.0]), np.signbit(wanted[wanted == 0.0]))
 
 
 def test_arrays_of_all_types_are_read_and_written(module):

@@ -1,10 +1,10 @@
-"""What the machine code of a kernel depends on: its file, and what that imports of the core."""
+"""What a compiled kernel depends on: its file, and what that imports of the core."""
 
 from __future__ import annotations
 
 import pytest
 
-from kin.kernels import sources
+from kin.codegen import fingerprint as sources
 
 FILES = {
     "kin/kernel.py": "from kin.solver import solve\nfrom kin import constants\n",
