@@ -1,7 +1,7 @@
 """The service: REST, the viewer, the command line. Installed as the package ``kinboard``.
 
 ``import kinboard`` also offers the public names of the core: ``kinboard.fk`` is ``kin.fk``. They are imported when
-they are first used, because a short command must start without numba.
+they are first used: `kinboard --help` needs none of them.
 """
 
 from __future__ import annotations

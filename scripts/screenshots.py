@@ -22,12 +22,10 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.viewer.own_arm import KEY, own_arm, pack
 from app.viewer.tabs.robot.presets import PRESETS
-from kin import get_robot
 
 FOLDER = Path(__file__).parents[1] / "docs" / "images"
 SIZE = {"width": 1280, "height": 720}
 WAIT = 60_000  # ms; software rendering is slow
-COMPILED = 600_000  # ms until the kernels of an arm are compiled, on a machine that never had it
 
 
 class Shot(NamedTuple):
@@ -153,11 +151,6 @@ def take(page: Page, address: str, shot: Shot) -> Image.Image:
     """Open the view, wait until it stands still, and photograph it."""
     page.goto(link(address, shot.state))
     arrive(page)
-    # Until its kernels are compiled, another arm is on show, and the card says so.
-    if shot.state["robot"] != KEY:
-        shown, name = "name => viserPage.valueOf('Robot') === name", get_robot(str(shot.state["robot"])).name
-        page.wait_for_function(shown, arg=name, timeout=COMPILED)
-    expect(page.locator("[data-status]").first).not_to_contain_text("Preparing", timeout=COMPILED)
     page.get_by_role("tab", name=shot.tab).click(force=True)
     page.mouse.move(5, 5)
     page.wait_for_timeout(1000 * shot.seconds)

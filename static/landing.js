@@ -20,13 +20,11 @@ async function readiness() {
 }
 
 async function openViewerWhenReady() {
-  const slowAfter = performance.now() + 6000;
   for (;;) {
     const status = await readiness();
     if (status === "ready") break;
     if (status === "failed") return show("failed", "The viewer could not start; see the log of the server. REST still works.");
-    const why = performance.now() > slowAfter ? " The first start on a machine compiles what moves the first arm, which takes some ten seconds; the rest follows beside your visit." : "";
-    show("warming", status === "warming" ? "The viewer is warming up…" + why : "Waiting for the server…");
+    show("starting", status === "starting" ? "The viewer is starting…" : "Waiting for the server…");
     await new Promise((resolve) => setTimeout(resolve, 400));
   }
   const viewer = document.createElement("iframe");

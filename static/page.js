@@ -54,12 +54,6 @@
   }
   addEventListener("pagehide", coloured);
 
-  // What the page waits for on a new machine is said by its cover: static/layout.css.
-  channel.watch("preparing", (words) => {
-    if (words) document.documentElement.dataset.kbPreparing = words;
-    else delete document.documentElement.dataset.kbPreparing;
-  });
-
   let there = false; // the cover is removed
   function follow() {
     tell();

@@ -4,7 +4,7 @@
 (() => {
   const root = document.documentElement;
   const SCHEME = "kinboard-scheme";
-  const PATIENCE = 120000; // ms until the page is shown in any case; a first start on a slow machine compiles for a minute
+  const PATIENCE = 60000; // ms until the page is shown in any case
   const GRACE = 1500; // ms from an error until it is shown: the page may come all the same
   const BROWSERS = "Chrome, Edge, Firefox or Safari of the last two years";
   const SENTENCES = {
@@ -28,10 +28,7 @@
     if (said) said.remove();
   }
   addEventListener("kinboard-there", uncover);
-  setTimeout(function again() {
-    if (root.hasAttribute("data-kb-preparing")) setTimeout(again, PATIENCE);
-    else if (!document.getElementById("kb-failed")) uncover();
-  }, PATIENCE);
+  setTimeout(() => { if (!document.getElementById("kb-failed")) uncover(); }, PATIENCE);
 
   function element(kind, text) {
     const made = document.createElement(kind);

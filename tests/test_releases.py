@@ -43,6 +43,8 @@ ENDS: dict[str, dict[str, tuple[list[float], list[float]]]] = {
         **dict.fromkeys(("vx300", "vx300s", "wx250", "wx250s"), ([0.0, 0.0, 0.0], [0.0, HALF, 0.0])),
     }
 }
+# Nothing waits for kernels any more. What /readyz says is outside of what docs/stability.md promises.
+GONE = {"GET /readyz": {"complete!", "kernels!", "kernels.preparing!", "kernels.ready!", "kernels.waiting!"}}
 
 
 def read(release: str, name: str) -> dict[str, Any]:
@@ -119,6 +121,7 @@ def test_requests_of_a_release_are_still_answered(now, release):
                 each for each in lost if each.endswith("rows[].d!")
             }  # sent, as the snapshots of arms show, but
             # generated clients have to read it last (`app.api.document`)
+            lost -= GONE.get(route, set())
             broken += [f"{route}: {status} without {each}" for each in sorted(lost)]
     assert not broken
 

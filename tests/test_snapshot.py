@@ -85,7 +85,7 @@ class Command:
     Args:
         files: what is in the working directory, by name.
         writes: a file that is read back afterwards.
-        process: in a process of its own, which does without the compiler.
+        process: in a process of its own.
     """
 
     words: str

@@ -19,7 +19,6 @@ from app.api.schemas import (
     OneOf,
     Pendant,
     example,
-    is_warm,
     joint_values,
     settings_of,
 )
@@ -115,7 +114,7 @@ async def forward_kinematics(request: Request, robot: Robot, body: FkRequest) ->
     size = POSE + FRAME * len(robot.rows) * body.frames + TEXT * (body.form is not None)
     batch = Batch("q", len(q), single, size, "frames false")
     answer = partial(_answers, robot, q, (body.frames, body.frame, axes, body.form), batch)
-    if is_warm(request) and len(q) <= FEW:
+    if len(q) <= FEW:
         return answer(Deadline(compute_slots(request)))
     return await computed(request, answer)
 

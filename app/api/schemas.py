@@ -101,11 +101,6 @@ def settings_of(request: Request) -> Settings:
     return settings
 
 
-def is_warm(request: Request) -> bool:
-    """Whether all kernels are loaded, so that a short computation may run on the event loop."""
-    return bool(request.app.state.startup.complete)
-
-
 RobotId = Annotated[str, Path(description="Id of the robot, as listed by GET /robots.", examples=["pioneer5"])]
 
 
@@ -121,7 +116,7 @@ _REFUSALS: dict[int, str] = {
     415: "The Content-Type of the body is not JSON.",
     422: "A value is invalid; the document names the field, the value and what is valid.",
     500: "Internal error.",
-    503: "Busy, being prepared on a new machine, or too slow; the header Retry-After says when to try again.",
+    503: "Busy or too slow; the header Retry-After says when to try again.",
 }
 
 

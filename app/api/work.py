@@ -13,7 +13,6 @@ import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import Future
 from contextlib import asynccontextmanager, contextmanager
-from contextvars import ContextVar
 from typing import Protocol, TypeVar
 
 from fastapi import Request
@@ -37,11 +36,6 @@ def busy(detail: str, setting: str = "", headers: dict[str, str] | None = None) 
     hint = "Try again in a moment" + (f", or ask the operator to raise {setting}." if setting else ".")
     headers = {"Retry-After": str(RETRY_AFTER)} | (headers or {})
     return ProblemError(503, "busy", detail, hint, headers=headers)
-
-
-def stopping() -> ProblemError:
-    """503 for a request that was cut short because the service is stopping."""
-    return busy("The service is being stopped.")
 
 
 ADVICE = "Request less at a time, or try again when the service is less busy"
@@ -127,12 +121,8 @@ class ComputeSlots:
 
     @contextmanager
     def watched(self, request: Request) -> Iterator[Deadline]:
-        """A deadline without a slot; within the context it also ends when the client leaves.
-
-        It is the `current_deadline` of the task and of the threads that work for it.
-        """
+        """A deadline without a slot; within the context it also ends when the client leaves."""
         deadline = Deadline(self)
-        current_deadline.set(deadline)
         watching: list[asyncio.Task[None]] = []
         loop = asyncio.get_running_loop()
         timer = loop.call_later(
@@ -141,7 +131,6 @@ class ComputeSlots:
         try:
             yield deadline
         finally:
-            current_deadline.set(None)
             timer.cancel()
             for task in watching:
                 task.cancel()
@@ -216,7 +205,7 @@ class Deadline:
         """Raises `ClientLeftError` once the client has left, 503 after the deadline or when the service stops."""
         self.check_client()
         if self._work.closed:
-            raise stopping()
+            raise busy("The service is being stopped.")
         if self.left < 0.0:
             raise TooSlowError(self._work.seconds, advice)
 
@@ -230,9 +219,6 @@ class Deadline:
         self._left = True
         if self.on_left is not None:
             self.on_left()
-
-
-current_deadline: ContextVar[Deadline | None] = ContextVar("current_deadline", default=None)
 
 
 async def _until_left(request: Request, deadline: Deadline) -> None:

@@ -25,7 +25,7 @@ from app.cli.arguments.postures import add_cuspidal, add_postures
 from app.cli.arguments.shared import Parents
 from app.cli.arguments.singularity import add_singularity
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
-from app.cli.startup import disable_compiler, no_collections
+from app.cli.startup import no_collections
 
 DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
 EPILOG = """examples:
@@ -48,16 +48,11 @@ class Command(NamedTuple):
         name: the first word of the command line.
         declare: adds its arguments.
         load: imports the function that runs it and returns the exit code.
-        interpreted: whether its kernels run as plain Python. One pose takes a tenth of a millisecond that way;
-            numba needs half a second to load compiled code.
-        compiled_with: an argument with which they are compiled all the same, as there is much to compute.
     """
 
     name: str
     declare: Callable[[Any, Parents], argparse.ArgumentParser]
     load: Callable[[], Run]
-    interpreted: bool = False
-    compiled_with: str = ""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -93,8 +88,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(command: Command, arguments: argparse.Namespace) -> int:
-    if command.interpreted and not (command.compiled_with and getattr(arguments, command.compiled_with)):
-        disable_compiler()
     try:
         with no_collections():
             run = command.load()
@@ -108,6 +101,11 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
             "package kin works.",
             file=sys.stderr,
         )
+        return 2
+    except ImportError as error:
+        if error.name is not None:
+            raise
+        print(f"kinboard: {error}", file=sys.stderr)  # there are no kernels, and why
         return 2
     except Exception as error:
         from kin import KinematicsError  # loaded already if it was raised
@@ -170,7 +168,6 @@ class _Version(argparse.Action):
     """Prints the version, which is imported only then."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        disable_compiler()
         from kin import __version__
 
         print(f"kinboard {__version__}")
@@ -361,29 +358,29 @@ COMMANDS = (
     Command("serve", declare.add_serve, _load_serve),
     Command("open", declare.add_open, _load_open),
     Command("mcp", add_mcp, _load_mcp),
-    Command("fk", declare.add_fk, _load_fk, interpreted=True, compiled_with="configurations"),
+    Command("fk", declare.add_fk, _load_fk),
     Command("ik", declare.add_ik, _load_ik),
     Command("move", declare.add_move, _load_move),
     Command("way", declare.add_way, _load_way),
     Command("singularity", add_singularity, _load_singularity),
     Command("page", declare.add_page, _load_page),
     Command("code", declare.add_code, _load_code),
-    Command("robots", declare.add_robots, _load_robots, interpreted=True),
+    Command("robots", declare.add_robots, _load_robots),
     Command("workspace", declare.add_workspace, _load_workspace),
     Command("postures", add_postures, _load_postures),
     Command("cuspidal", add_cuspidal, _load_cuspidal),
     Command("room", add_room, _load_room),
-    Command("result", add_result, _load_result, interpreted=True),
-    Command("results", add_results, _load_results, interpreted=True),
-    Command("lti", add_lti, _load_lti, interpreted=True),
+    Command("result", add_result, _load_result),
+    Command("results", add_results, _load_results),
+    Command("lti", add_lti, _load_lti),
     Command("bench", declare.add_bench, _load_bench),
-    Command("check", declare.add_check, _load_check, interpreted=True),
-    Command("compare", declare.add_compare, _load_compare, interpreted=True),
-    Command("motors", declare.add_motors, _load_motors, interpreted=True),
+    Command("check", declare.add_check, _load_check),
+    Command("compare", declare.add_compare, _load_compare),
+    Command("motors", declare.add_motors, _load_motors),
     Command("calibrate", add_calibrate, _load_calibrate),
-    Command("doctor", declare.add_doctor, _load_doctor, interpreted=True),
+    Command("doctor", declare.add_doctor, _load_doctor),
     Command("capability", declare.add_capability, _load_capability),
-    Command("import", declare.add_import, _load_import, interpreted=True),
-    Command("export", declare.add_export, _load_export, interpreted=True),
-    Command("completion", declare.add_completion, _load_completion, interpreted=True),
+    Command("import", declare.add_import, _load_import),
+    Command("export", declare.add_export, _load_export),
+    Command("completion", declare.add_completion, _load_completion),
 )

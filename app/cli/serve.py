@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from app.cli.startup import hidden, no_collections
+from app.cli.startup import no_collections
 from app.shared.settings import OBSOLETE, Settings
 from app.shared.threads import end_process
 
@@ -50,7 +50,7 @@ def run_mcp(arguments: Namespace) -> int:
     except ImportError:
         print("kinboard: this needs an extra: pip install 'kinboard[mcp]'", file=sys.stderr)
         return 2
-    with no_collections(), hidden("scipy"):
+    with no_collections():
         from app.service.main import create_app
     token = None if settings.token is None else settings.token.get_secret_value()
     with contextlib.suppress(KeyboardInterrupt):
@@ -73,11 +73,8 @@ def read_settings(given: Mapping[str, Any]) -> Settings | None:
 
 
 def import_service() -> Callable[..., int]:
-    """What runs the service (:func:`app.service.main.run`); later collections skip what it has imported.
-
-    numba imports SciPy to look at its version. No kernel calls it.
-    """
-    with no_collections(), hidden("scipy"):
+    """What runs the service (:func:`app.service.main.run`); later collections skip what it has imported."""
+    with no_collections():
         from app.service.main import run
 
         gc.freeze()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -19,22 +17,3 @@ def no_collections() -> Iterator[None]:
     finally:
         if collecting:
             gc.enable()
-
-
-@contextmanager
-def hidden(package: str) -> Iterator[None]:
-    """Lets imports go on as where `package` is not installed, unless it has been imported; for a single thread."""
-    if package in sys.modules:
-        yield
-        return
-    sys.modules[package] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        del sys.modules[package]
-
-
-def disable_compiler() -> None:
-    """Let the kernels of this process run as plain Python, if nothing has imported numba yet."""
-    if "numba" not in sys.modules:
-        os.environ.setdefault("NUMBA_DISABLE_JIT", "1")

@@ -39,6 +39,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.files import get_robot
+from kin.fk import fk
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -132,9 +133,6 @@ def compare(robot_id: str, q: ArrayLike) -> list[Comparison]:
         UnknownRobotError: no built-in robot has this id.
         InputError: q is not finite numbers ``(..., n)``.
     """
-    # Imported here, so that reading the equations does not load the compiled kernels.
-    from kin.fk import fk
-
     robot = get_robot(robot_id)
     q = robot.check_q(q)
     T = fk(robot, q)

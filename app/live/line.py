@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +26,6 @@ VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a progr
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
 QUIET: Final = frozenset({"drives", "readings", "measured", "draw", "clear"})  # changes nothing that undo restores
-PREPARING: Final = 2.0  # s between two messages about the same step of what is compiled
 REPLIES: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -86,15 +84,10 @@ class Program:
 
 @dataclass(frozen=True)
 class Reply:
-    """What a program hears once: that what the message of this number asks for is done, or why it is not.
-
-    Attributes:
-        preparing: what the page must compile before it can do it, the step, and how many there are.
-    """
+    """What a program hears once: that what the message of this number asks for is done, or why it is not."""
 
     number: int | None = None
     problem: Problem | None = None
-    preparing: tuple[str, int, int] | None = None
 
 
 @dataclass
@@ -128,8 +121,6 @@ class Line:
         self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
         self.measured: Sequence[float] | None = None  # where the real arm was last, in joint values
         self.recording: Recording | None = None
-        # What the program has heard of last, and when.
-        self._prepared: tuple[tuple[str, int, int], float] = (("", 0, 0), 0.0)
 
     def note(self, way: str, text: str | bytes) -> None:
         """Record a message of the connection, if it is recorded.
@@ -218,25 +209,6 @@ class Line:
             pending, self._pending[key] = self._pending[key], PendingUpdate()
         return pending
 
-    def waiting(self, name: str) -> Any:
-        """What the program has sent under this name, and the page has not taken yet; None: nothing."""
-        with self._lock:
-            return self._pending[MOVES].values.get(name)
-
-    def prepare(self, what: str, step: int, of: int) -> None:
-        """Tell the program how far the page is that compiles what its message needs.
-
-        It hears of each step, and every `PREPARING` seconds, so that it knows that the page is there.
-        """
-        found, now = (what, step, of), time.monotonic()
-        if found == self._prepared[0] and now - self._prepared[1] < PREPARING:
-            return
-        self._prepared = found, now
-        with self._lock:
-            numbers = self._pending[MOVES].numbers
-            number = numbers[-1] if numbers else None
-        self._post_reply(Reply(number, preparing=found))
-
     def publish(self, name: str, value: object, anew: bool = True) -> None:
         """What the page shows now; unless `anew`, only where it is another object than before."""
         with self._lock:
@@ -261,9 +233,7 @@ class Line:
 
     def write(self, number: int | None = None, problem: Problem | None = None) -> None:
         """Tell the program something once."""
-        self._post_reply(Reply(number, problem))
-
-    def _post_reply(self, reply: Reply) -> None:
+        reply = Reply(number, problem)
         with self._lock:
             program = self._program
             if program is not None:

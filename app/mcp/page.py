@@ -30,7 +30,7 @@ from app.shared.problems import FieldError, Problem, show
 from kin import KinematicsError
 
 IDLE: Final = 120.0  # s
-ANSWER: Final = 20.0  # s for an answer of the page, or a sign that it compiles what it needs
+ANSWER: Final = 20.0  # s for an answer of the page
 SHOWN: Final = ("q", "target", "result", "contacts", "program")
 # Of a message: what an agent that moves no machine has to say.
 FIELDS: Final = ("robot", "q", "target", "obstacles", "program", "play", "draw", "clear")
@@ -129,7 +129,6 @@ class Visit:
         self._shown: dict[str, Any] = {}
         self._answers: dict[int, asyncio.Future[None]] = {}
         self._count = 0
-        self._prepared = 0.0
         self._timer: asyncio.TimerHandle | None = None
         self._closing: asyncio.Task[None] | None = None
         self._reader = asyncio.ensure_future(self._read())
@@ -144,18 +143,14 @@ class Visit:
         number = self._count
         given = {name: value for name, value in fields.items() if value is not None}
         answer = self._answers[number] = loop.create_future()
-        self._prepared = loop.time()
         try:
             if number == 1:  # apart: a message that is refused subscribes to nothing
                 await self._socket.send(json.dumps({"subscribe": {"values": SHOWN, "rate": 10}}))
             # With a value, if only an empty drawing: else it is done before the page has said what it shows.
             await self._socket.send(json.dumps({"draw": {}, **given, "id": number}))
-            while not answer.done():
-                left = self._prepared + ANSWER - loop.time()
-                if left <= 0.0:
-                    raise _ended(f"the page has not answered within {ANSWER:g} s")
-                await asyncio.wait((answer,), timeout=left)
-            answer.result()
+            await asyncio.wait_for(answer, ANSWER)
+        except TimeoutError:
+            raise _ended(f"the page has not answered within {ANSWER:g} s") from None
         except (OSError, ConnectionClosed) as error:
             raise _ended(str(error)) from None
         finally:
@@ -178,8 +173,6 @@ class Visit:
                 self._shown |= {name: value for name, value in message.items() if name in ("robot", *SHOWN)}
                 if (robot := message.get("robot")) is not None:
                     self._shown["robot"] = {name: robot[name] for name in ("id", "name", "joints")}
-            case "preparing":
-                self._prepared = asyncio.get_running_loop().time()
             case "done" if answer is not None and not answer.done():
                 answer.set_result(None)
             case "problem" if answer is not None or "id" not in message:

@@ -14,7 +14,7 @@ from typing import Any
 
 from kin import KinematicsError
 
-PATIENCE = 60.0  # s until the service must listen
+PATIENCE = 180.0  # s until the service must listen; in a checkout it may compile kernels before
 STOP = 5.0  # s for its end
 _ADDRESS = re.compile(r"https?://[^\s/]*:(\d+)/")
 

@@ -1,1 +1,1 @@
-"""The running service: application, start-up, and processes that compute and compile."""
+"""The running service: application, start-up, and the processes that compute."""

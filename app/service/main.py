@@ -63,7 +63,7 @@ from app.shared.slots import Slots
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import end_process
-from kin import InputError, RobotFileError, __version__
+from kin import InputError, RobotFileError, __version__, fk
 
 if TYPE_CHECKING:
     from app.service.web.agents import Agents
@@ -101,7 +101,7 @@ def create_app(
     courses: Courses | None = None,
     pool: Pool | None = None,
 ) -> FastAPI:
-    """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
+    """The whole service as one ASGI application; `on_ready` is called when it is ready.
 
     Args:
         courses: those of the operator, and exercises; None: they are read when needed.
@@ -120,7 +120,7 @@ def create_app(
     known = cache(lambda: courses or _courses(settings, store))
     lines = Lines()
     begin = store, settings, clouds, maps, summaries, classroom
-    startup = Startup(lambda kernels: _viewer(*begin, kernels, known(), lines), bridge, pool, on_ready)
+    startup = Startup(lambda: _viewer(*begin, known(), lines), bridge, pool, on_ready)
 
     def idle() -> bool:
         return not (bridge.slots.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -242,6 +242,9 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         except (InputError, RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
+        fk(
+            store.robots[0], store.robots[0].q_home
+        )  # loads the kernels, which all copies of this process then have
         if settings.token is None and not settings.read_only:
             if not is_loopback(listener):
                 print(OPEN_TO_ALL, file=sys.stderr, flush=True)
@@ -301,5 +304,5 @@ def _serve(
     finally:
         signal.signal(signal.SIGTERM, before)
     if server.started:
-        end_process(0)  # threads may still compile or compute
+        end_process(0)  # threads may still compute
     return 1

@@ -42,7 +42,6 @@ KINDS = {
     "wrong-host": "The request is for another host",
     "other-origin": "Pages of this origin may not read answers",
     "busy": "The service is busy",
-    "preparing": "What the request needs is being prepared",
     "too-slow": "The computation takes too long",
     "internal-error": "Internal error",
     "http-error": "The request was rejected",

@@ -39,6 +39,10 @@ OBSOLETE: Final[Mapping[str, str]] = MappingProxyType(
         "KINBOARD_BENCH": "visitors start no benchmark; kinboard bench --html FILE makes a scoreboard",
         "KINBOARD_PIN": "one process serves all, on any processor",
     }
+    | dict.fromkeys(
+        ("NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT"),
+        "kernels are compiled before the program begins",
+    )
 )
 
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)]

@@ -201,8 +201,6 @@ class Feature:
         key: short name, used in events and in the shared URL.
         title: name shown to the visitor.
         about: one-sentence description, for the list of lessons.
-        kernels: names of the parts of the core (`kin.warmup.parts`) that it needs, beside what moves the robot. On
-            a new machine the visitor waits for them. `ALL`: what else arms of the robot's family do.
         messages: the events that the page's own script may send, by the first part of their key.
         files: those of these events that bring a file, and its most bytes (`app.viewer.session.channel.files`).
         acts: whether they change what the visitor sees of the arm and the lessons, which a class that is led or
@@ -215,7 +213,6 @@ class Feature:
     key: ClassVar[str]
     title: ClassVar[str]
     about: ClassVar[str] = ""
-    kernels: ClassVar[tuple[str, ...]] = ()
     messages: ClassVar[frozenset[str]] = frozenset()
     files: ClassVar[Mapping[str, int]] = MappingProxyType({})
     acts: ClassVar[bool] = True
@@ -224,11 +221,6 @@ class Feature:
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.due: float | None = None
-
-    @classmethod
-    def kernels_of(cls, key: Hashable) -> tuple[str, ...]:
-        """The `kernels` for an event with this key."""
-        return cls.kernels
 
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event for this feature's `handle`; thread-safe. Pass it to controls (`panel.listen`)."""

@@ -24,7 +24,6 @@ from app.shared.connection import (
     SentFile,
 )
 from app.shared.maps import Maps
-from app.shared.preparation import Preparation
 from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -63,7 +62,6 @@ class ViewerServer:
 
     Args:
         maps, summaries, classroom: shared with REST; None: the viewer creates and closes its own.
-        preparation: which kernels are compiled; None: all are.
         courses: shared with REST, as are the exercises in them; None: the viewer reads both.
         lines: shared with REST, which connects programs to them; None: none is.
 
@@ -80,7 +78,6 @@ class ViewerServer:
         maps: Maps | None = None,
         summaries: Summaries | None = None,
         classroom: Hub | None = None,
-        preparation: Preparation | None = None,
         courses: Courses | None = None,
         lines: Lines | None = None,
     ) -> None:
@@ -89,8 +86,7 @@ class ViewerServer:
         hub = classroom or Hub.of(settings)
         caches = clouds, maps or Maps(), summaries or Summaries()
         readers = meshes, Library(meshes)
-        kernels = preparation or Preparation()
-        self.services = Services(store, *caches, *readers, Pace(), known, hub, kernels, lines or Lines())
+        self.services = Services(store, *caches, *readers, Pace(), known, hub, lines or Lines())
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._owns_classroom = classroom is None

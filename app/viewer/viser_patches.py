@@ -289,8 +289,7 @@ def log_what_viser_prints() -> None:
     """Make viser log its warnings, and what callbacks raise: messages of visitors may be in both.
 
     Python's own `warnings` would keep the text of each for ever. While another thread is in a block of
-    `warnings.catch_warnings`, as numba often is, it would give them to that thread, and with two such threads to
-    nobody from then on.
+    `warnings.catch_warnings`, it would give them to that thread, and with two such threads to nobody from then on.
     """
 
     def warn(message: object, category: type[Warning] = UserWarning, stacklevel: int = 1, **_: Any) -> None:

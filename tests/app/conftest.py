@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import pytest
 from fastapi.testclient import TestClient
 
-import kin
 from app.service.compute.pool import Pool
 from app.service.main import create_app
 from app.shared.clouds import Clouds
@@ -43,6 +42,5 @@ def port() -> Iterator[int]:
 
     from app.viewer.server import ViewerServer
 
-    kin.warm_up()
     with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
         yield port

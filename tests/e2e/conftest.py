@@ -75,7 +75,7 @@ def wait_until_ready(url: str, seconds: float = 180.0) -> None:
         try:
             with urllib.request.urlopen(url + "readyz", timeout=5):
                 return
-        except OSError as error:  # 503 until everything is warm
+        except OSError as error:  # 503 until it is ready
             reason = str(error)
         time.sleep(0.2)
     pytest.fail(f"not ready after {seconds} s: {reason}")

@@ -101,7 +101,7 @@ def test_a_notebook_moves_the_arm(page: Page) -> None:
     robot = kin.get_robot("pioneer5")
     view = kin.show(robot, q=robot.q_home)
     try:
-        page.goto(view.url.replace("localhost", "127.0.0.1"))  # reloads until the service is warm
+        page.goto(view.url.replace("localhost", "127.0.0.1"))  # reloads until the service is ready
         expect(page.locator("[data-status]")).to_be_visible(timeout=4 * WAIT)
         view.q = q = robot.q_home + 0.1
         expect(page.locator("[data-status]")).to_contain_text("moved by the notebook")

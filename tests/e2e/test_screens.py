@@ -20,7 +20,6 @@ from app.shared.settings import static_folder
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 LOOK = (Path(__file__).parent / "screens.js").read_text(encoding="utf-8")
-COLD = 120_000  # ms; a service that is ready may still be compiling the kernels of sections and maps
 ATTEMPTS = 12
 FEW = 4000  # points; the page is rendered in software
 
@@ -106,10 +105,8 @@ def section(tab: Tab) -> None:
     tab.choose("Cut", "along the arm")
     tab.check("Section plot")
     tab.check("Sizes")
-    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1, timeout=COLD)
-    expect(tab.page.locator("table[aria-label='sizes of the workspace']")).not_to_contain_text(
-        "computing", timeout=COLD
-    )
+    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1)
+    expect(tab.page.locator("table[aria-label='sizes of the workspace']")).not_to_contain_text("computing")
 
 
 def capability(tab: Tab) -> None:
@@ -122,7 +119,7 @@ def capability(tab: Tab) -> None:
         folder.press("Enter")
     tab.choose("Grid", "15 voxels long")
     tab.page.get_by_role("button", name="Start").last.click()
-    expect(tab.page.locator("[data-map]")).to_have_attribute("data-map", "done", timeout=COLD)
+    expect(tab.page.locator("[data-map]")).to_have_attribute("data-map", "done")
 
 
 def view(tab: Tab) -> None:
@@ -195,7 +192,7 @@ def test_phone_dark(phone: Tab) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_pages_without_a_viewer(browser: Browser, address: str, scheme: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 720}, color_scheme=scheme)
-    page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "warming"}'))
+    page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "starting"}'))
     login = (
         (static_folder() / "login.html")
         .read_text(encoding="utf-8")

@@ -243,7 +243,7 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
     # A robot that an operator added has no picture.
     page.route("**/static/robots/scara.webp", lambda route: route.fulfill(status=404))
     if name != "light":  # loading the embedded viewer once is enough: it is rendered in software
-        page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "warming"}'))
+        page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "starting"}'))
     page.goto(address)
     expect(page.locator(".card h3 a")).to_have_count(len(ROBOTS) + 1)  # the visitor's own
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing sticks out"

@@ -17,7 +17,6 @@ pytestmark = pytest.mark.browser
 
 PIONEER = kin.get_robot("pioneer5")
 FEW = 10_000  # points; the page is rendered in software
-COLD = 120_000  # ms; a service that is ready may still be compiling the kernels of sections
 
 
 def draw(tab: Tab, points: int) -> None:
@@ -62,7 +61,7 @@ def test_a_cut_and_the_section_plot(tab: Tab) -> None:
     tab.choose("Cut", "along the arm")
     expect(tab.page.get_by_text("Cut at (mm)")).to_be_visible()
     tab.check("Section plot")
-    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1, timeout=COLD)
+    expect(tab.page.locator("[data-plot=section] image")).to_have_count(1)
     section = tab.page.locator("[data-plot=section] svg").bounding_box()
     dot = tab.page.locator("[data-plot=tool] svg").bounding_box()
     assert section is not None
@@ -99,8 +98,8 @@ def test_a_click_in_a_posture_map_lists_the_postures_of_the_place(tab: Tab) -> N
         folder.click()
     tab.page.get_by_role("button", name="Start").last.click()
     nodes = tab.page.locator("[data-guide-map] image")
-    expect(nodes).to_have_count(1, timeout=COLD)
-    expect(tab.page.get_by_text(re.compile(r"regions?\. A: "))).to_be_visible(timeout=COLD)
+    expect(nodes).to_have_count(1)
+    expect(tab.page.get_by_text(re.compile(r"regions?\. A: "))).to_be_visible()
     tab.page.get_by_role("button", name="A", exact=True).click()
     rows = tab.page.locator("[data-posture]")
     expect(rows.first).to_be_visible()

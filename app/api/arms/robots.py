@@ -50,7 +50,7 @@ class BriefRobotList(Answer):
 )
 async def list_robots(request: Request, find: Find = "", brief: Brief = False) -> Response:
     """Every arm with its DH table, joints and limits. Its `id` goes into the other addresses."""
-    # On a machine where no kernels are compiled yet, the solvers of general arms take seconds to be chosen.
+    # The solvers of the operator's arms are chosen by solving test poses.
     found = await run_in_threadpool(_answers, store_of(request).robots, find, brief)
     return reply({"robots": found})
 

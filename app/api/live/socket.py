@@ -256,7 +256,7 @@ class Conversation:
                 self._known.update({name: number for name, (number, _) in values.items()})
                 await self._send(news({name: value for name, (_, value) in values.items()}))
             for reply in replies:
-                self._own.append(_letter(reply.number, reply.problem, reply.preparing))
+                self._own.append(_letter(reply.number, reply.problem))
             while self._own:
                 await self._send(self._own.popleft())
 
@@ -266,13 +266,8 @@ class Conversation:
         await self._visitor.send_text(text.decode())
 
 
-def _letter(
-    number: int | None, problem: Problem | None, preparing: tuple[str, int, int] | None = None
-) -> dict[str, Any]:
+def _letter(number: int | None, problem: Problem | None) -> dict[str, Any]:
     given = {} if number is None else {"id": number}
-    if preparing is not None:
-        what, step, of = preparing
-        return {"type": "preparing", **given, "what": what, "step": step, "of": of}
     if problem is None:
         return {"type": "done", **given}
     return {"type": "problem", **given, "problem": problem.model_dump()}

@@ -84,7 +84,6 @@ class Connection:
         self._answers: dict[int, Future[None]] = {}
         self._number = 0
         self._socket: ClientConnection | None = None
-        self._prepared = -math.inf  # when the page last said that it compiles something for us
         self._opened = -math.inf  # when the connection was opened
         self._lost = 0  # connections since the last steady one
         self._failed = 0  # how often the service has failed since then
@@ -132,19 +131,12 @@ class Connection:
             self._streams = None
             self._lock.notify_all()
         try:
-            self._wait(answer, timeout)
+            answer.result(timeout)
+        except TimeoutError:
+            raise KinematicsError(f"the page has not answered within {timeout:g} s") from None
         finally:
             with self._lock:
                 self._answers.pop(number, None)
-
-    def _wait(self, answer: Future[None], timeout: float) -> None:
-        """Wait for an answer; while the page compiles what the message needs, it says so, and may take longer."""
-        while True:
-            try:
-                return answer.result(timeout)
-            except TimeoutError:
-                if answer.done() or time.monotonic() - self._prepared >= timeout:
-                    raise KinematicsError(f"the page has not answered within {timeout:g} s") from None
 
     def _check(self) -> None:
         if self.ended:
@@ -193,13 +185,10 @@ class Connection:
         if message["type"] == "end":
             self.end(message["reason"])
         self._heard(message | {"asked": answer is not None})
-        if message["type"] == "preparing":
-            self._prepared = time.monotonic()
-            return
         if answer is not None and not answer.done():
             if message["type"] == "problem":
                 answer.set_exception(RefusedError(message["problem"]))
-            else:
+            elif message["type"] == "done":
                 answer.set_result(None)
 
     def _lose(self, socket: ClientConnection, error: Exception) -> None:

@@ -373,8 +373,6 @@ class Page:
             if kind == "problem" and not message.get("asked"):
                 self._refused = RefusedError(message["problem"])
                 self._tell(Event("problem", self._refused))
-            elif kind == "preparing":
-                self._tell(Event("preparing", {name: message[name] for name in ("what", "step", "of")}))
             elif kind == "disconnected":
                 self._sent = None
                 self._tell(Event("disconnected"))

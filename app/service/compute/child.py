@@ -27,16 +27,13 @@ from starlette.responses import Response
 from app.api import api_routes
 from app.api.batches import HeldResponse
 from app.api.problems import ClientLeftError, ProblemError, as_problem
-from app.api.work import ComputeSlots, Deadline, current_deadline
-from app.service.compiler import Compilers
+from app.api.work import ComputeSlots, Deadline
 from app.service.log import guard_log
 from app.shared.memory.answers import AnswerMemory
 from app.shared.memory.process import MemoryKeeper
 from app.shared.settings import Settings
 from app.shared.threads import NICENESS
-from kin import Robot
-from kin.kernels.elsewhere import compile_elsewhere
-from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
+from kin import Robot, fk
 
 CANCEL: Final = b""  # the message that nobody waits for the present answer any more
 _LENGTH = struct.Struct(">Q")
@@ -126,16 +123,6 @@ def settings_given() -> Settings:
     return _PROCESS.settings
 
 
-def load_first(_: Deadline | None = None) -> None:
-    """Load what moves the first arm."""
-    warm_up_first()
-
-
-def load_rest(_: Deadline | None = None) -> None:
-    """Load all kernels that are in the cache; returns at once, and goes on beside what is computed."""
-    threading.Thread(target=warm_up_rest, name="kinboard-warm-up", daemon=True).start()
-
-
 def main() -> None:
     """Compute until the service ends. Messages come on the standard input and go to the standard output."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
@@ -154,11 +141,7 @@ def main() -> None:
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     api_routes()  # imports and builds what computations refer to
-    compile_elsewhere(Compilers().compile)
-    if compiled():
-        warm_up_first()
-    if rest_compiled():
-        load_rest()
+    fk(begin.robots[0], begin.robots[0].q_home)  # loads the kernels
     gc.freeze()
     MemoryKeeper(lambda: not _PROCESS.busy).start()
     while True:
@@ -171,15 +154,12 @@ def main() -> None:
 
 def _found(job: bytes, deadline: Deadline) -> object:
     """What a job returns or raises."""
-    current_deadline.set(deadline)
     try:
         answer, seconds = pickle.loads(job)
         deadline.start(left=seconds)
         return answer(deadline)
     except Exception as error:  # noqa: BLE001 - the service raises it
         return Failure(_sendable(error))
-    finally:
-        current_deadline.set(None)
 
 
 def _sendable(error: Exception) -> Exception:

@@ -8,8 +8,8 @@ computation ends when its client leaves or its time is over: the process is aske
 
 Why not a library's pool: `anyio.to_process` ends a computation by killing its process, reads answers on the event
 loop, and ends processes that are idle for five minutes; a new one needs one to two seconds until it has imported
-the core and loaded kernels. `concurrent.futures` loses all processes with one of them, and needs semaphores, which
-are files in ``/dev/shm``. Here each process has two pipes.
+the core. `concurrent.futures` loses all processes with one of them, and needs semaphores, which are files in
+``/dev/shm``. Here each process has two pipes.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Answer = Callable[[Deadline], T]
 
 GRACE = 0.4  # s for a computation to end after its client has left
 LATE = 5.0  # s for one whose time is over: a list of targets is answered in part, after the target that it is at
-TRIES = 3  # to prepare a process
+TRIES = 3  # to start a process
 
 
 class Pool:
@@ -64,37 +64,20 @@ class Pool:
 
     def start(self) -> None:
         """Start the processes; returns at once. Any thread may call."""
-        self._each("start", ComputeProcess.start)
+        for process in self.processes:
+            threading.Thread(target=process.start, name="kinboard-pool-start", daemon=True).start()
 
-    def prepare(self, load: Callable[[Deadline], None]) -> None:
-        """Have each process load something, and wait for that. Any thread may call; raises what `load` raises."""
-        job = self.message(load, 3600.0)
-        failures: list[BaseException] = []
-
-        def ask(process: ComputeProcess) -> None:
+    def wait(self) -> None:
+        """Wait until each process takes jobs; raises `LostError` if one does not. Any thread may call."""
+        job = self.message(bool, 3600.0)  # any answer will do
+        for process in self.processes:
             for left in reversed(range(TRIES)):
                 try:
                     process.ask(Job(job))
-                except Exception as error:  # noqa: BLE001 - raised below
-                    if not (isinstance(error, LostError) and left):
-                        failures.append(error)
-                        return
-                else:
-                    return
-
-        for thread in self._each("prepare", ask):
-            thread.join()
-        if failures:
-            raise failures[0]
-
-    def _each(self, name: str, act: Callable[[ComputeProcess], None]) -> list[threading.Thread]:
-        threads = [
-            threading.Thread(target=act, args=(process,), name=f"kinboard-pool-{name}", daemon=True)
-            for process in self.processes
-        ]
-        for thread in threads:
-            thread.start()
-        return threads
+                    break
+                except LostError:
+                    if not left:
+                        raise
 
     async def run(self, answer: Answer[T], deadline: Deadline, took: Callable[[float], object] | None = None) -> T:
         """What `answer` returns in another process, or raises there. The caller has a slot for one of them.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import pickle
 import subprocess
+import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -13,7 +15,6 @@ from typing import IO, Any
 
 from app.api.batches import response_of
 from app.api.work import busy
-from app.service.compiler import kill, start_process
 from app.service.compute import child
 from app.service.compute.child import CANCEL, Failure, Head, read, write
 from app.shared.memory.answers import AnswerMemory, MemoryFullError
@@ -163,6 +164,28 @@ class ComputeProcess:
         with self._lock:
             self.child = None
             silent = expected or self._stopped
-        code = kill(ended)
+        code = _kill(ended)
         if not silent:
             logger.error("a process that computes has ended with code %s; another one takes its place", code)
+
+
+def start_process(program: str) -> subprocess.Popen[bytes]:
+    """A Python process with two pipes to it, in a session of its own, so that it gets no Ctrl-C."""
+    return subprocess.Popen(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
+
+
+def _kill(child: subprocess.Popen[bytes]) -> int:
+    """End a process and close its pipes; returns its exit code."""
+    child.kill()
+    code = child.wait()
+    for pipe in (child.stdin, child.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):  # what was not read by the process is lost
+                pipe.close()
+    return code

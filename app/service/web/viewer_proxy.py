@@ -49,8 +49,8 @@ from kin.parsing import Limits, TextError, read_json
 
 logger = logging.getLogger("kinboard.bridge")
 
-_WARMING_PAGE = short_page(
-    "Kinboard is warming up", "<p>The viewer is warming up and will appear here in a moment.</p>", again=1
+_STARTING_PAGE = short_page(
+    "Kinboard is starting", "<p>The viewer is starting and will appear here in a moment.</p>", again=1
 )
 _FULL_PAGE = short_page(
     "Kinboard is full",
@@ -130,7 +130,7 @@ class ViewerBridge:
     async def page(self, request: Request) -> Response:
         """viser's page with our content policy; until the viewer has started, 503 and a page that tries again."""
         if self.viewer is None:
-            return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
+            return HTMLResponse(_STARTING_PAGE, status_code=503, headers={"retry-after": "1"})
         if not self.slots.free(client_of(request.scope)):
             return HTMLResponse(_FULL_PAGE, status_code=503, headers={"retry-after": "10"})
         link = discovery(request)
@@ -146,7 +146,7 @@ class ViewerBridge:
             await visitor.close()  # before the handshake: a 403
             return
         if self.viewer is None:
-            await _turn_away(visitor, "The viewer is warming up.")
+            await _turn_away(visitor, "The viewer is starting.")
             return
         client = client_of(visitor.scope)
         if not self.slots.take(client):
@@ -166,7 +166,7 @@ class ViewerBridge:
         if not self._is_ours(visitor):
             await visitor.close()
         elif self.viewer is None:
-            await _turn_away(visitor, "The viewer is warming up.")
+            await _turn_away(visitor, "The viewer is starting.")
         elif protocols[:1] != [CHANNEL_PROTOCOL] or len(protocols) != 2:
             await visitor.close()
         else:
@@ -179,7 +179,7 @@ class ViewerBridge:
         if not self._is_ours(request):
             raise ProblemError(403, "forbidden", "Pages of other sites may not send files.", "")
         if self.viewer is None:
-            raise ProblemError(503, "busy", "The viewer is warming up.", "Try again in a moment.")
+            raise ProblemError(503, "busy", "The viewer is starting.", "Try again in a moment.")
         sent = _sent_file(request)
         try:
             await self.viewer.receive_file(request.headers.get(CHANNEL_NAME, ""), sent, request.stream())
@@ -336,7 +336,7 @@ class _Page:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
         # A menu that opens beside a phone's screen must not widen the page.
         html = html.replace(b"initial-scale=1", b"initial-scale=1, minimum-scale=1", 1)
-        # Before viser's own script, for which it prepares the page.
+        # Before viser's own script, which it must come before.
         self._html = html.replace(b"<head>", b"<head>" + _OURS + link.encode(), 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {

@@ -22,7 +22,7 @@ def processors() -> int:
         return os.cpu_count() or 1
 
 
-def lower_priority(niceness: int = NICENESS) -> None:
+def lower_priority() -> None:
     """Let the threads of visitors run before this one.
 
     Linux has a niceness per thread. Elsewhere niceness belongs to the process, and nothing is done.
@@ -30,15 +30,14 @@ def lower_priority(niceness: int = NICENESS) -> None:
     if sys.platform == "linux":
         thread = threading.get_native_id()
         own = os.getpriority(os.PRIO_PROCESS, thread)  # who started the process may have lowered it farther
-        os.setpriority(os.PRIO_PROCESS, thread, max(own, niceness))
+        os.setpriority(os.PRIO_PROCESS, thread, max(own, NICENESS))
 
 
 def end_process(code: int) -> NoReturn:
     """End this process at once, whatever its threads do.
 
-    The usual end of a Python process destroys LLVM while a thread compiles a kernel, which aborts the process; and
-    it waits for the threads of executors. Functions registered with `atexit` are called, and output is flushed.
-    A forked process must have called `forget_exit_handlers`.
+    The usual end of a Python process waits for the threads of executors. Functions registered with `atexit` are
+    called, and output is flushed. A forked process must have called `forget_exit_handlers`.
     """
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):

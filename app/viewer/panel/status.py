@@ -138,7 +138,7 @@ def _kind(result: IKResult) -> Kind:
     return "unreachable"
 
 
-def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "", offer: str = "") -> str:
+def html(shown: Notice, warning: str = "", failure: str = "", offer: str = "") -> str:
     """The notice as a card, with what is added to it. ``static/layout.css`` places it over the scene.
 
     A notice that all is well is no longer blue or green beside a warning or a failure, and the card says both.
@@ -154,7 +154,6 @@ def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "",
         "panel/status",
         notice=shown,
         warning=typeset(warning),
-        waiting=waiting,
         symbol=symbol,
         color=color,
         offer=Markup(offer),
@@ -162,7 +161,7 @@ def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "",
 
 
 class StatusLine:
-    """Shows one notice at a time, and with it a warning about the configuration of the arm and what is waited for.
+    """Shows one notice at a time, and with it a warning about the configuration of the arm.
 
     A notice is news until the visitor does something else; one without advice ends by itself, too.
 
@@ -178,7 +177,7 @@ class StatusLine:
         self._news_since: float | None = None
         self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
-        self._warning = self._waiting = self._failure = self._offer = ""
+        self._warning = self._failure = self._offer = ""
         self._cover: Notice | None = None
         self._html = add_html(gui, html(first))
 
@@ -215,12 +214,6 @@ class StatusLine:
             self._offer = offer
             self._write()
 
-    def wait(self, waiting: str) -> None:
-        """Show what the visitor waits for, until the next call; nothing if it is empty."""
-        if waiting != self._waiting:
-            self._waiting = waiting
-            self._write()
-
     def cover(self, shown: Notice | None) -> None:
         """Show this instead of everything else, which goes on below it, until the next call; None ends it."""
         self._cover = shown
@@ -230,7 +223,7 @@ class StatusLine:
         if self._cover is not None:
             update_html(self._html, html(self._cover))
             return
-        update_html(self._html, html(self._shown, self._warning, self._waiting, self._failure, self._offer))
+        update_html(self._html, html(self._shown, self._warning, self._failure, self._offer))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

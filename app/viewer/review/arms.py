@@ -21,7 +21,7 @@ def other_arm(
 ) -> Robot:
     """An arm for which the question with this key differs in its numbers alone; `robot` itself if there is none.
 
-    Only arms of the same family are tried: what solves them is compiled.
+    Only arms of the same family are tried.
     """
     asked = _question(lesson, question, robot)
     others = [one for one in robots if one.id != robot.id and family_of(one) == family_of(robot)]

@@ -23,15 +23,14 @@ class ClassroomPage(MemberPage):
 
     # Worker
 
-    def _load(self) -> None:
-        super()._load()
+    def _prepare(self) -> None:
+        super()._prepare()
         if self._persistence.embedded:  # a figure in another page: neither led nor frozen, and no arm of the wall
             self.offered = tuple(tab for tab in self.offered if not issubclass(tab, Member))
             return
         if self._inbox.closed:
             return
-        # Not while the page is built: a database that does not answer would hold up the pages of everybody. And
-        # before the page waits for its arm: the class sees who is there.
+        # Not while the page is built: a database that does not answer would hold up the pages of everybody.
         news = ("news", Member.key, NEWS)
         self.attendance = self._hub.attend(self._ticket, lambda: self.post(news), self.channel.silence)
 

@@ -31,7 +31,6 @@ class Rule:
         answered: whether its handler replies to that message.
         act: whether it moves the arm or opens something, which ends a lead and is refused in a class that is
             frozen. Of a feature's events only messages count: features also post what they have computed.
-        replaces: whether nobody waits any more for another robot that is being compiled.
     """
 
     label: str = ""
@@ -40,7 +39,6 @@ class Rule:
     message: bool = False
     answered: bool = False
     act: bool = False
-    replaces: bool = False
 
 
 RULES: Final[dict[str, Rule]] = {
@@ -51,7 +49,7 @@ RULES: Final[dict[str, Rule]] = {
     "redundancy": Rule("Redundancy", gradual=LONG_PAUSE, act=True),
     "lock": Rule("Lock", act=True),
     "branch": Rule("Posture", act=True),
-    "robot": Rule("Robot", act=True, replaces=True),
+    "robot": Rule("Robot", act=True),
     "find": Rule(step=False),
     "task": Rule("Target must match", act=True),
     "home": Rule("Home", act=True),
@@ -85,9 +83,9 @@ RULES: Final[dict[str, Rule]] = {
     "lesson": Rule("Lesson", message=True, act=True),
     "feature": Rule(message=True, act=True),
     "news": Rule(step=False),
-    "undo": Rule(step=False, message=True, act=True, replaces=True),
-    "redo": Rule(step=False, message=True, act=True, replaces=True),
-    "travel": Rule(step=False, message=True, act=True, replaces=True),
+    "undo": Rule(step=False, message=True, act=True),
+    "redo": Rule(step=False, message=True, act=True),
+    "travel": Rule(step=False, message=True, act=True),
     FENCE: Rule(step=False),
 }
 MESSAGES: Final = tuple(name for name, rule in RULES.items() if rule.message)

@@ -178,11 +178,6 @@ def choices() -> tuple[type[Feature], ...]:
     return (*LESSONS, *MORE, Reviewing)
 
 
-def lesson_titled(title: object) -> type[Lesson] | None:
-    """The lesson with this title; None if there is none."""
-    return next((lesson for lesson in LESSONS if lesson.title == title), None)
-
-
 def after(lesson: type[Lesson]) -> str:
     """The title of the lesson that follows one; "" after the last."""
     following = LESSONS[LESSONS.index(lesson) + 1 :]

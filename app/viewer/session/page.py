@@ -54,7 +54,6 @@ from app.viewer.session.numbers import Numbers
 from app.viewer.session.palette import Palette
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
-from app.viewer.session.preparing import Preparing
 from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState
@@ -148,7 +147,6 @@ class VisitorPage(ShownArm, Worker):
         self.live = LiveInput(self)
         self.driven = ""  # what a program drives with the arm
         self._actions = Actions(self, self.live)
-        self._preparing = Preparing(self, services.preparation)
 
     # Stage: what features may use
 
@@ -361,8 +359,6 @@ class VisitorPage(ShownArm, Worker):
     @property
     def _timeout(self) -> float | None:
         times = [feature.due for feature in self.features if feature.due is not None]
-        if self._preparing.due is not None:
-            times.append(self._preparing.due)
         if self.arm.moving or self.camera.gliding:
             times.append(self._pace.interval)
         elif self._persistence.due is not None and not self.arm.dragging:
@@ -394,8 +390,6 @@ class VisitorPage(ShownArm, Worker):
                 if self.arm.target is None:
                     self.numbers.hide_target()
                 now = time.perf_counter()
-                if self._preparing.due is not None:
-                    self._preparing.tick()
                 if self.status.due(now) == 0.0:
                     self.settle_status()
                 self.camera.tick(now)
@@ -429,8 +423,6 @@ class VisitorPage(ShownArm, Worker):
         self._guard(lambda: self._persistence.save(self._actions.history.take_key()))
 
     def _act(self, key: Hashable, value: object) -> None:
-        if not self._preparing.admits(key, value):
-            return
         self._actions.handle(key, value)
 
     def _show_hints(self) -> None:
@@ -449,12 +441,7 @@ class VisitorPage(ShownArm, Worker):
         update_html(self.panel.hints, render("panel/hints", place=place, arm=arm))
 
     def _prepare(self) -> None:
-        self._load()
-        saved = self._persistence.stored
-        self._preparing.wait(saved, robot_of(self, saved.robot), self.offered, lambda: self._inbox.closed)
-
-    def _load(self) -> None:
-        """Find out with what the page starts, before it waits for the kernels of that."""
+        """Find out with what the page starts."""
         self._persistence.load()
         self.own = self._persistence.stored.own
 

@@ -9,7 +9,6 @@ from app.classroom.courses import Courses
 from app.live import Lines
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
-from app.shared.preparation import Preparation
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.meshes.library.library import Library
@@ -20,7 +19,7 @@ from app.viewer.scene.motion import Pace
 @dataclass(frozen=True)
 class Services:
     """The robots, the caches of expensive results, the readers of meshes, the frame rate, courses with their
-    exercises, the live state of classrooms, which kernels are compiled, and the lines to programs."""
+    exercises, the live state of classrooms, and the lines to programs."""
 
     store: Store
     clouds: Clouds
@@ -31,5 +30,4 @@ class Services:
     pace: Pace
     courses: Courses
     classroom: Hub
-    preparation: Preparation
     lines: Lines

@@ -35,7 +35,7 @@ def live():
     install_problem_handlers(app)
     app.router.routes.extend(api_routes())
     with serve(app) as port, httpx2.Client(base_url=f"http://127.0.0.1:{port}", trust_env=False, timeout=60) as c:
-        assert c.post(f"{ARM}/ik", json={"target": POINT}, timeout=300).status_code == 200  # kernels are compiled
+        assert c.post(f"{ARM}/ik", json={"target": POINT}, timeout=300).status_code == 200
         yield app, c
     app.state.summaries.close()
 

@@ -302,10 +302,9 @@ def test_extreme_but_finite_numbers_never_put_nan_into_an_answer(client):
             )
 
 
-@pytest.mark.parametrize(("complete", "count", "inline"), [(True, 3, True), (False, 3, False), (True, 40, False)])
+@pytest.mark.parametrize(("count", "inline"), [(3, True), (40, False)])
 @pytest.mark.usefixtures("computes_here")
-def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(app, client, monkeypatch, complete, count, inline):
-    """Only short computations run on the event loop, and none while kernels may be compiling."""
+def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(client, monkeypatch, count, inline):
     on_the_loop = []
 
     def watched(*arguments):
@@ -317,7 +316,6 @@ def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(app, client, monke
         return fk_answers(*arguments)
 
     monkeypatch.setattr("app.api.fk.fk_answers", watched)
-    monkeypatch.setattr(app.state.startup, "complete", complete)
     answer = client.post("/api/v1/robots/pioneer5/fk", json={"q": [[0.0] * 5] * count})
     assert len(answer.json()["results"]) == count
     assert set(on_the_loop) == {inline}

@@ -16,7 +16,6 @@ import pytest
 from arms import random_arms
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numba.core.dispatcher import Dispatcher
 
 import kin
 from app.api.arms.description import _SCHEMA, DEFAULTS, EXAMPLE
@@ -435,23 +434,6 @@ def objects(kind):
     """All objects of a kind, also of modules imported while tests were collected (`tests/conftest.py`)."""
     gc.unfreeze()
     return [each for each in gc.get_objects() if issubclass(type(each), kind)]  # not proxies, which may be dead
-
-
-def signatures():
-    """How many signatures of kernels are compiled."""
-    return sum(len(each.signatures) for each in objects(Dispatcher))
-
-
-@pytest.mark.full
-def test_an_arm_sent_along_compiles_nothing(client):
-    """All kernels take any arm: what is compiled before the first one is enough."""
-    kin.warm_up()
-    kin.warm_up(everything=True)
-    before = signatures()
-    assert before > 10
-    for robot in arms(12):
-        ask(client, robot)
-    assert signatures() == before
 
 
 def test_no_cache_without_bound_keeps_arms(client):

@@ -242,7 +242,7 @@ def test_leaving_a_room_in_a_frame_forgets_its_cookies(tmp_path: Path) -> None:
         tmp_path, 1, "https://school.example", frame_ancestors="https://lms.example", token="a-long-enough-token"
     )
     student.post("/room/join", data={"code": hub.rooms.open("Class", 3600.0).code, "alias": "Ada"})
-    assert student.get("/viewer/").status_code == 503  # warming up: admitted
+    assert student.get("/viewer/").status_code == 503  # starting: admitted
     cookies = student.post("/room/leave").headers.get_list("set-cookie")
     assert {each.partition("=")[0] for each in cookies} == {COOKIE, "kinboard_guest"}
     for each in cookies:

@@ -479,7 +479,7 @@ def test_version_and_help(capsys):
 
 @pytest.mark.full
 def test_the_program_itself():
-    """A process of its own, without the compiler: the same digits, and a start that does not load the server."""
+    """A process of its own: the same digits, and a start that does not load the server."""
     words = [
         sys.executable,
         "-X",

@@ -25,14 +25,12 @@ def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
         monkeypatch.setenv(name, "2")
     assert main(["serve", "--workers", "3", "--pin", "--port", "0"]) == 0
     said = capsys.readouterr().err.splitlines()
-    names = ("BENCH", "PIN", "REST_WORKERS", "WORKERS")
+    names = ("KINBOARD_BENCH", "KINBOARD_PIN", "KINBOARD_REST_WORKERS", "KINBOARD_WORKERS")
     assert [line.partition(" does nothing")[0] for line in said] == [
-        *(f"kinboard: KINBOARD_{name}" for name in names),
-        "kinboard: --workers",
-        "kinboard: --pin",
+        *(f"kinboard: {name}" for name in (*names, "NUMBA_CACHE_DIR", "NUMBA_DISABLE_JIT", "--workers", "--pin"))
     ]
     assert "kinboard bench --html" in said[0]
-    assert all("KINBOARD_COMPUTE" in line for line in said[2:5])
+    assert all("KINBOARD_COMPUTE" in line for line in (*said[2:4], said[6]))
     assert given[0].port == 0
 
 

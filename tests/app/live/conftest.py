@@ -9,7 +9,6 @@ import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
-import kin
 from app.api import ComputeSlots, api_routes
 from app.live import Lines
 from app.service.web.rooms.limits import Limits
@@ -22,7 +21,6 @@ from app.viewer.server import ViewerServer
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[int]:
     """Where a viewer and the websocket of its programs are served."""
-    kin.warm_up()
     settings, store, lines = Settings(), Store(), Lines()
     state = {
         "settings": settings,

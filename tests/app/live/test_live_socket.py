@@ -372,7 +372,6 @@ def test_a_recording_has_every_message_that_the_program_hears(page, port):
                 page.line.publish(name, values[k % len(values)])
             say(program, id=100 + k, play=False)  # the news come before its answer
             until("done", 100 + k)
-        page.line.prepare("UR5", 1, 3)
         page.line.write(3)
         page.line.write(4, problem(422, "invalid-input", "q[0]: “7”", "Send less."))
         page.line.write(problem=problem(409, "not-allowed", "The target is held."))
@@ -384,7 +383,7 @@ def test_a_recording_has_every_message_that_the_program_hears(page, port):
     found = [(e.topic, json.loads(e.data)) for e in recording.entries if e.topic.startswith("/heard/")]
     assert found == expected
     assert {topic for topic, _ in found} == {
-        f"/heard/{name}" for name in ("welcome", "done", "preparing", "problem", "end", "robot", *VALUES)
+        f"/heard/{name}" for name in ("welcome", "done", "problem", "end", "robot", *VALUES)
     }
     assert recording.ended is None
 

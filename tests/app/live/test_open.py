@@ -149,7 +149,7 @@ def ready(address: str) -> bool:
     try:
         with urllib.request.urlopen(f"{address}readyz", timeout=20) as answer:
             return bool(answer.status == 200)
-    except urllib.error.HTTPError:  # it is still warming up
+    except urllib.error.HTTPError:  # it is still starting
         return False
 
 

@@ -64,7 +64,7 @@ class Victim:
     def connection(self, source: str = "127.0.0.1", **options: int) -> socket.socket:
         """A connection from an address of this machine. Options: `receive`, the size of its buffer."""
         connection = socket.socket()
-        connection.settimeout(120)  # kernels may have to be compiled
+        connection.settimeout(60)
         if "receive" in options:
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, options["receive"])
         connection.bind((source, 0))

@@ -12,7 +12,6 @@ import contextlib
 import functools
 import itertools
 import json
-import mmap
 import os
 import re
 import shutil
@@ -46,9 +45,8 @@ from app.classroom.tables import Attempt
 from app.exports.robots import robot_file
 from app.viewer.session.state import PageState, encode
 from kin import get_robot
-from kin.kernels.cache import KernelCache, kernel_folder
 
-MOST = 8 << 20  # bytes of each folder, besides compiled kernels
+MOST = 8 << 20  # bytes of each folder
 SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT and KINBOARD_TIME_BUDGET
 HANG = signal.SIGUSR1  # lets the event loop of the service hang
 PATIENCE = 120.0  # s for what is not measured
@@ -168,13 +166,6 @@ class Machine:
         for entry in self._seen(name).iterdir():
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
 
-    def damage(self, name: str) -> None:
-        """Change a bit in each file of a folder."""
-        for file in self._seen(name).rglob("*.nb?"):
-            content = bytearray(file.read_bytes())
-            content[len(content) // 2] ^= 0x10
-            file.write_bytes(content)
-
     def replace(self, name: str) -> None:
         """Put a file where a folder was."""
         place = self._seen(name)
@@ -210,7 +201,7 @@ class Machine:
             self.cookie = f"{COOKIE}={student.cookies[COOKIE]}"
 
     def student(self) -> FakeBrowser:
-        """A page of the student, at an exercise; tried again while the viewer starts or kernels are compiled."""
+        """A page of the student, at an exercise; tried again while the viewer starts."""
         end = time.monotonic() + PATIENCE
         while True:
             try:
@@ -294,45 +285,19 @@ SEEDS = {
 }
 
 
-def seed(folder: Path, kernels: bool) -> int:
-    """Write what the folders of a machine hold at first; returns the bytes of its compiled kernels."""
+def seed(folder: Path) -> None:
+    """Write what the folders of a machine hold at first."""
     for name in ("temp", *SEEDS):
         (folder / name / "in").mkdir(parents=True)
     for name, text in SEEDS.items():
         (folder / name / "in" / "of-this-machine.toml").write_text(text)
-    size = 0
-    to = folder / "cache" / "in" / "kinboard"
-    for file in compiled_kernels() if kernels else ():
-        to.mkdir(parents=True, exist_ok=True)
-        shutil.copy(file, to)
-        size += -(-file.stat().st_size // mmap.PAGESIZE) * mmap.PAGESIZE
-    return size
-
-
-def compiled_kernels() -> Iterator[Path]:
-    """The files of the kernels of today's core, among those of other versions."""
-    place = kernel_folder()
-    assert place is not None
-    functions = (
-        each
-        for name, module in sorted(sys.modules.items())
-        if name.startswith("kin.")
-        for each in vars(module).values()
-    )
-    kernels = {id(each): each for each in functions if isinstance(getattr(each, "_cache", None), KernelCache)}
-    for kernel in kernels.values():
-        yield from place.glob(f"{kernel._cache.stem(kernel.targetctx.codegen())}-*.nbc")
 
 
 @contextmanager
-def running_machine(base: Path, kernels: bool = False) -> Iterator[Machine]:
-    """A service with folders and a clock of its own, and a student in a room.
-
-    Args:
-        kernels: whether a folder of compiled kernels is among the folders; otherwise that of the tests is used.
-    """
+def running_machine(base: Path) -> Iterator[Machine]:
+    """A service with folders and a clock of its own, and a student in a room."""
     folders, clock, seeds = base / "folders", base / "clock", base / "seeds"
-    size = MOST + seed(seeds, kernels)
+    seed(seeds)
     clock.write_text("0")
     (base / "code").mkdir()
     (base / "code" / "sitecustomize.py").write_text(STARTUP)
@@ -346,15 +311,13 @@ def running_machine(base: Path, kernels: bool = False) -> Iterator[Machine]:
         "FAULTY_CLOCK": str(clock),
         "FAULTY_FOLDERS": str(folders),
         "FAULTY_SEEDS": str(seeds),
-        "FAULTY_SIZE": str(size),
+        "FAULTY_SIZE": str(MOST),
         "TMPDIR": str(folders / "temp" / "in"),
         "KINBOARD_DATA": str(folders / "data" / "in"),
         "KINBOARD_COMPUTE": "1",
         "KINBOARD_TIME_BUDGET": str(SILENCE),
         "KINBOARD_WORKER_TIMEOUT": str(SILENCE),
     } | {f"KINBOARD_{name.upper()}": str(folders / name / "in") for name in SEEDS}
-    if kernels:
-        environment["NUMBA_CACHE_DIR"] = str(folders / "cache" / "in")
     before = (*APART, "sh", "-c", MOUNT, "sh") if mounted else ()
     with (
         platforms(base) as (file, addresses),

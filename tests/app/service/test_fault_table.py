@@ -45,7 +45,6 @@ from app.shared.settings import Settings
 REST = 5.0  # s
 VISITORS = 10.0  # s
 LINES = 100  # of the log during one fault: after a hang it says where each thread was
-COMPILING = 30.0  # s, until a page opens and programs have their answers without any compiled kernel
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="the service starts again by itself on Linux only"),
@@ -63,7 +62,6 @@ class Fault:
         act: lets it happen; what it adds to the stack lasts while the service is watched.
         sample: whether it is tried in every run, not only in slow ones.
         late: seconds until the service can notice it.
-        work: seconds that the service has to compute before a page can open or a program has its answer.
         lost: requests that may break, because a process was working on them.
         keeps: whether the answers that were stored before are there afterwards.
     """
@@ -73,7 +71,6 @@ class Fault:
     act: Act
     sample: bool = False
     late: float = 0.0
-    work: float = 0.0
     lost: int = 0
     keeps: bool = True
 
@@ -155,16 +152,13 @@ FOLDERS = [
         and_replace_all(act),
         (name, how) in SAMPLED,
         lost=2,
-        work=COMPILING if name == "cache" and how in ("damaged", "gone") else 0.0,
     )
-    for name in ("temp", "shm", "data", "cache", *SEEDS)
+    for name in ("temp", "shm", "data", *SEEDS)
     for how, act in (
         ("full", lambda on, name=name: on.fill(name)),
         ("read-only", lambda on, name=name: on.protect(name)),
-        ("damaged", lambda on, name=name: on.damage(name)),
         ("gone", lambda on, name=name: on.remove(name)),
     )
-    if how != "damaged" or name == "cache"  # damaged databases and robot files have tests of their own
 ]
 
 CLOCKS = [
@@ -202,17 +196,10 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
         yield found
 
 
-@pytest.fixture(scope="module")
-def with_own_kernels(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
-    with running_machine(tmp_path_factory.mktemp("machine"), kernels=True) as found:
-        yield found
-
-
 @pytest.mark.parametrize(
     "fault", [pytest.param(row, marks=() if row.sample else pytest.mark.slow, id=str(row)) for row in TABLE]
 )
-def test_the_service_holds(fault: Fault, request: pytest.FixtureRequest) -> None:
-    service: Machine = request.getfixturevalue("with_own_kernels" if fault.what == "cache" else "service")
+def test_the_service_holds(fault: Fault, service: Machine) -> None:
     if not service.cookie:
         service.enter_room()
     with service.student() as page:
@@ -224,7 +211,7 @@ def test_the_service_holds(fault: Fault, request: pytest.FixtureRequest) -> None
         factor = strain()
         began = time.monotonic()
         fault.act(service, stack)
-        service.visit(factor * (VISITORS + fault.work) + fault.late)
+        service.visit(factor * VISITORS + fault.late)
         back = time.monotonic() - began
         factor = max(factor, strain())
         count = len(asking.answers)
@@ -236,8 +223,8 @@ def test_the_service_holds(fault: Fault, request: pytest.FixtureRequest) -> None
         f"{fault}: visitors after {back:.1f} s, REST within {worst:.1f} s, strain {factor:.1f}, {broken} requests "
         f"lost, {len(lines)} lines of the log"
     )
-    assert back <= factor * (VISITORS + fault.work) + fault.late
-    assert worst <= factor * (REST + fault.work) + fault.late
+    assert back <= factor * VISITORS + fault.late
+    assert worst <= factor * REST + fault.late
     assert broken <= fault.lost
     assert {status for _, status in asking.answers} <= {200, 503, None}
     assert len(lines) <= LINES, "".join(lines)
@@ -272,10 +259,9 @@ DECLARED = {
             "service",
             "app/service/test_restarts.py::test_one_that_does_not_stop_is_killed",
         ),
-        "app/service/compiler.py": (
+        "app/service/compute/process.py": (
             "compute",
             "app/service/compute/test_pool.py::test_a_process_that_ends_loses_one_request",
-            "app/service/start/test_compiler.py::test_a_process_that_ends_says_so",
         ),
         "kin/codegen/extension/build.py": (
             "kin/kernels/test_ahead.py::test_where_it_cannot_be_built_it_is_said_what_to_set",
@@ -293,7 +279,6 @@ DECLARED = {
         "exercises": ("exercises",),
         "courses": ("courses",),
         "lti": ("app/classroom/test_lti.py::test_the_service_does_not_start_with_a_wrong_file",),
-        "kin/kernels/cache.py": ("cache",),
         "kin/codegen/extension/build.py": (
             "kin/codegen/extension/test_build.py::test_only_a_unit_that_has_changed_is_compiled_again",
         ),
@@ -317,7 +302,6 @@ CALLS = {
         "TemporaryDirectory",
         "TemporaryFile",
         "NamedTemporaryFile",
-        "kernel_folder",
     },
     "peers": {"create_server", "create_engine", "HTTPConnection", "HTTPSConnection", "urlopen", "build_opener"},
 }
@@ -355,8 +339,7 @@ def test_the_table_is_complete() -> None:
 
     assert ways(*SIGNALS) == {role: set(names) for role, names in SIGNALS.items()}
     folders = {row.what for row in FOLDERS}
-    every = {"full", "read-only", "gone"}
-    assert ways(*folders) == {folder: every | ({"damaged"} if folder == "cache" else set()) for folder in folders}
+    assert ways(*folders) == {folder: {"full", "read-only", "gone"} for folder in folders}
     peers = {row.what for row in PEERS}
     assert ways(*peers) == {peer: set(MANNERS) for peer in peers}
     assert len({str(row) for row in TABLE}) == len(TABLE)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
-import textwrap
 import threading
 import time
 from collections.abc import Iterator
@@ -117,16 +114,7 @@ def test_a_stop_completes_answers_in_progress_and_notifies_visitors():
 
 
 @pytest.mark.slow
-def test_a_stop_while_kernels_compile_is_clean_and_in_time(tmp_path):
-    """The usual end of a Python process aborts in LLVM, about one time in five."""
-    for k in range(16):
-        with service(False, NUMBA_CACHE_DIR=str(tmp_path / str(k))) as (process, _):
-            time.sleep(0.5 + 0.4 * k)
-            assert stopped(process, 9.0) == ""
-
-
-@pytest.mark.slow
-def test_a_stop_under_load_is_in_time(tmp_path):
+def test_a_stop_under_load_is_in_time():
     """Next to four processes for each processor, as Docker stops a service that has just started."""
     spin = "import time; end = time.monotonic() + 120\nwhile time.monotonic() < end: pass"
     with contextlib.ExitStack() as stack:
@@ -134,7 +122,7 @@ def test_a_stop_under_load_is_in_time(tmp_path):
             spinning = stack.enter_context(subprocess.Popen([sys.executable, "-c", spin]))
             stack.callback(spinning.kill)
         for k in range(3):
-            process, _ = stack.enter_context(service(False, NUMBA_CACHE_DIR=str(tmp_path / str(k))))
+            process, _ = stack.enter_context(service(False))
             time.sleep(2.0 + 2.0 * k)
             stopped(process, 10.0)
 
@@ -215,12 +203,6 @@ def drained(pieces: Iterator[bytes]) -> None:
 
 
 # -- a visitor's worker ----------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
-        yield port
 
 
 def test_a_worker_that_dies_is_replaced_and_the_visitor_informed(port, monkeypatch, caplog):
@@ -337,132 +319,3 @@ def test_a_file_that_does_not_fit_is_removed(tmp_path, capsys):
         signal.signal(signal.SIGXFSZ, ignored)
     assert "File too large" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
-
-
-# -- the cache of machine code ---------------------------------------------------------------------------------
-
-KERNEL = """
-from kin.kernels.compile import jit
-
-@jit
-def twice(x):
-    return 2.0 * x
-"""
-
-
-def twice(folder: Path, before: str = "", kernel: str = KERNEL, cache: Path | None = None) -> dict[str, object]:
-    """Run a kernel of this folder in a new process: its result, cache hits and warnings."""
-    code = f"""
-        import json, sys, warnings
-        {before}
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            import kernel
-            result = kernel.twice(1.5)
-        hits = sum(kernel.twice.stats.cache_hits.values())
-        print(json.dumps({{"result": result, "hits": hits, "warnings": [str(w.message) for w in caught]}}))
-    """
-    (folder / "kernel.py").write_text(kernel)
-    env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
-    env |= {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", "KINBOARD_CACHE": str(cache or folder / "cache")}
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-        env=env,
-    )
-    answer: dict[str, object] = json.loads(done.stdout)
-    return answer
-
-
-def machine_code(folder: Path) -> list[Path]:
-    return list((folder / "cache" / "kernels").glob("*.nbc"))
-
-
-@pytest.fixture(scope="module")
-def first(tmp_path_factory) -> Path:
-    """A folder in which the kernel has been compiled."""
-    folder = tmp_path_factory.mktemp("kernel")
-    assert twice(folder) == {"result": 3.0, "hits": 0, "warnings": []}
-    return folder
-
-
-@pytest.fixture
-def compiled(first, tmp_path) -> Path:
-    """A copy of it."""
-    return shutil.copytree(first, tmp_path / "copy")
-
-
-def test_a_copy_of_the_source_elsewhere_uses_the_same_machine_code(compiled, tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    found = twice(tmp_path / "elsewhere", cache=compiled / "cache")
-    assert found == {"result": 3.0, "hits": 1, "warnings": []}
-
-
-@pytest.mark.parametrize("left", [0, 200])
-def test_truncated_machine_code_is_discarded(compiled, left):
-    (file,) = machine_code(compiled)
-    file.write_bytes(file.read_bytes()[:left])
-    found = twice(compiled)
-    assert (found["result"], found["hits"]) == (3.0, 0)
-    (message,) = found["warnings"]
-    assert "cannot be read" in message
-    assert twice(compiled) == {"result": 3.0, "hits": 1, "warnings": []}
-
-
-def test_many_damaged_files_are_one_line_of_the_log(tmp_path):
-    """A kernel and another one that it calls."""
-    both = KERNEL.replace("2.0 * x", "2.0 * same(x)") + "\n\n@jit\ndef same(x):\n    return x\n"
-    assert twice(tmp_path, kernel=both)["warnings"] == []
-    files = machine_code(tmp_path)
-    assert len(files) == 2
-    for file in files:
-        file.write_bytes(b"")
-    found = twice(tmp_path, kernel=both)
-    assert (found["result"], found["hits"]) == (3.0, 0)
-    (message,) = found["warnings"]
-    assert "cannot be read" in message
-    assert twice(tmp_path, kernel=both) == {"result": 3.0, "hits": 1, "warnings": []}
-
-
-def test_damaged_machine_code_is_discarded(compiled):
-    """A few flipped bits, which unpickling does not notice: the code would be wrong, or end the process."""
-    (file,) = machine_code(compiled)
-    content = bytearray(file.read_bytes())
-    content[-40] ^= 0x10
-    file.write_bytes(content)
-    found = twice(compiled)
-    assert (found["result"], found["hits"]) == (3.0, 0)
-    (message,) = found["warnings"]
-    assert "cannot be read" in message
-    assert twice(compiled) == {"result": 3.0, "hits": 1, "warnings": []}
-
-
-def test_machine_code_of_another_version_stays_and_is_not_used(compiled):
-    changed = KERNEL + "# changed\n"
-    assert twice(compiled, kernel=changed) == {"result": 3.0, "hits": 0, "warnings": []}
-    assert twice(compiled, kernel=changed)["hits"] == twice(compiled)["hits"] == 1
-    assert len(machine_code(compiled)) == 2
-
-
-def test_kernels_work_without_a_writable_cache_and_warn_once(tmp_path):
-    (tmp_path / "file").touch()
-    found = twice(tmp_path, cache=tmp_path / "file")
-    assert found["result"] == 3.0
-    (message,) = found["warnings"]
-    assert "Not a directory" in message
-    assert "KINBOARD_CACHE" in message
-
-
-def test_kernels_work_on_a_full_disk_and_warn_once(tmp_path):
-    refused = """
-        from pathlib import Path
-        def refuse(self, data): raise OSError(28, "No space left on device")
-        Path.write_bytes = refuse
-    """
-    found = twice(tmp_path, textwrap.dedent(refused).replace("\n", "\n        "))
-    assert found["result"] == 3.0
-    (message,) = found["warnings"]
-    assert "No space left on device" in message

@@ -17,19 +17,18 @@ import httpx2
 import psutil
 import pytest
 import viser
-from compiling import kernel, stand_in_for_the_compiler
 from fastapi.testclient import TestClient
 from live_server import serve, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-import app.service.startup
-import app.shared.preparation
+from app.service.compute.pool import Pool
+from app.service.compute.process import LostError
 from app.service.main import create_app, run
 from app.shared.settings import Settings, static_folder
+from app.shared.store import Store
 from app.viewer.server import ViewerServer
 from kin import builtin_robots
-from kin.warmup import first_family, parts
 
 ROOT = Path(__file__).parents[3]
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -48,9 +47,9 @@ def client() -> Iterator[TestClient]:
         yield client
 
 
-def readiness(status: str, complete: bool) -> dict:
-    """What /readyz answers where rooms can be opened and no kernel has to be compiled."""
-    return {"status": status, "complete": complete, "kernels": None, "classrooms": "ready"}
+def readiness(status: str) -> dict:
+    """What /readyz answers where rooms can be opened."""
+    return {"status": status, "classrooms": "ready"}
 
 
 @pytest.mark.full
@@ -58,58 +57,27 @@ def test_livez_and_readyz(client):
     alive = client.get("/livez")
     assert (alive.status_code, alive.json()) == (200, {"status": "alive", "pid": os.getpid()})
     ready = client.get("/readyz")
-    assert (ready.status_code, ready.json()) == (200, readiness("ready", ready.json()["complete"]))
+    assert (ready.status_code, ready.json()) == (200, readiness("ready"))
     assert ready.headers["cache-control"] == "no-store"
 
 
 @pytest.mark.full
-def test_during_warm_up_pages_are_served_and_readyz_reports_warming(monkeypatch):
-    warm = threading.Event()
-    monkeypatch.setattr(app.service.startup, "warm_up_first", lambda: warm.wait(30))
+def test_until_the_viewer_has_started_pages_are_served_and_readyz_reports_starting(monkeypatch):
+    may_start, start = threading.Event(), ViewerServer.start
+    monkeypatch.setattr(ViewerServer, "start", lambda self, loop: may_start.wait(30) and start(self, loop))
     events = []
     with TestClient(create_app(Settings(), on_ready=lambda: events.append("ready"))) as client:
         for _ in range(3):
             answer = client.get("/readyz")
-            assert (answer.status_code, answer.json()) == (503, readiness("warming", False))
+            assert (answer.status_code, answer.json()) == (503, readiness("starting"))
             assert client.get("/livez").status_code == 200
             assert client.get("/").status_code == 200
             assert client.get("/api/v1/robots").status_code == 200
         assert events == []
-        warm.set()
+        may_start.set()
         wait_for(lambda: client.get("/readyz").json()["status"] == "ready")
         assert events == ["ready"]
         assert client.get("/readyz").status_code == 200
-
-
-def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monkeypatch, tmp_path):
-    stand_in_for_the_compiler(monkeypatch)
-    first, rest = (kernel(tmp_path, name, ready=False) for name in ("first", "rest"))
-    service = create_app(Settings())
-    compilers, began = service.state.startup.compilers, []
-
-    def warm_up_first(*, backwards=False):
-        began.append(backwards)
-        compilers.compile(first)
-
-    monkeypatch.setattr(app.service.startup, "compiled", lambda: False)
-    monkeypatch.setattr(app.service.startup, "rest_compiled", lambda: False)
-    monkeypatch.setattr(app.service.startup, "warm_up_first", warm_up_first)
-    monkeypatch.setattr(app.service.startup, "processors", lambda: 2)
-    missing = {name: (lambda: compilers.compile(rest),) for name in parts()}
-    monkeypatch.setattr(app.shared.preparation, "parts", lambda: missing)
-    with TestClient(service) as client:
-        wait_for(lambda: compilers.asked.child is not None and compilers.ahead.child is not None)
-        assert client.get("/readyz").status_code == 503
-        Path(first).touch()
-        wait_for(lambda: client.get("/readyz").status_code == 200, 120)
-        wait_for(lambda: (kernels := client.get("/readyz").json()["kernels"]) and kernels["preparing"])
-        kernels = client.get("/readyz").json()["kernels"]
-        assert kernels["ready"] == [first_family()]
-        assert [kernels["preparing"], *kernels["waiting"]] == list(parts())
-        processes = compilers.asked.child, compilers.ahead.child
-        assert [process.poll() for process in processes] == [None, None]
-    assert sorted(began) == [False, False, True]
-    assert None not in [process.poll() for process in processes]
 
 
 def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
@@ -118,11 +86,30 @@ def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
 
     monkeypatch.setattr(ViewerServer, "start", fail)
     with TestClient(create_app(Settings())) as client:
-        wait_for(lambda: client.get("/readyz").json() == readiness("failed", False))
+        wait_for(lambda: client.get("/readyz").json() == readiness("failed"))
         assert client.get("/readyz").status_code == 503
         assert client.get("/viewer/").status_code == 503
         assert client.get("/api/v1/robots").status_code == 200
     assert "this version of viser cannot be used" in caplog.text
+
+
+@pytest.mark.parametrize("status", ["ready", "failed"])
+def test_the_service_is_ready_when_its_processes_compute(monkeypatch, status):
+    computes = threading.Event()
+
+    def wait(self: Pool) -> None:
+        assert computes.wait(60)
+        if status == "failed":
+            raise LostError
+
+    monkeypatch.setattr(Pool, "start", lambda self: None)
+    monkeypatch.setattr(Pool, "wait", wait)
+    settings, store = Settings(), Store()
+    with TestClient(create_app(settings, store, pool=Pool(1, settings, store))) as client:
+        wait_for(lambda: client.get("/viewer/").status_code == 200, 60)
+        assert client.get("/readyz").json() == readiness("starting")
+        computes.set()
+        wait_for(lambda: client.get("/readyz").json() == readiness(status))
 
 
 @pytest.mark.full
@@ -137,46 +124,6 @@ def test_stopping_ends_the_viewer_and_the_thread_that_started_it(monkeypatch):
     assert len(stopped) == 1
     assert client.get("/viewer/").status_code == 503
     wait_for(lambda: not [thread for thread in threading.enumerate() if thread.name == "kinboard-startup"])
-
-
-def test_rare_kernels_are_compiled_when_ready_until_the_service_stops(monkeypatch):
-    begun, ended = threading.Event(), threading.Event()
-
-    def rest(stop):
-        begun.set()
-        wait_for(stop, 60)
-        ended.set()
-
-    monkeypatch.setattr(app.service.startup, "warm_up_first", lambda: None)
-    monkeypatch.setattr(app.service.startup, "warm_up_rest", rest)
-    with TestClient(create_app(Settings())) as client:
-        assert begun.wait(30)
-        wait_for(lambda: client.get("/readyz").json() == readiness("ready", False), 60)
-        assert not ended.is_set()
-    assert ended.wait(10)
-
-
-def test_readyz_is_complete_when_the_last_kernel_is_compiled(monkeypatch):
-    rest = threading.Event()
-    for asked in ("compiled", "rest_compiled"):  # whatever this machine has compiled so far
-        monkeypatch.setattr(app.service.startup, asked, lambda: True)
-    monkeypatch.setattr(app.service.startup, "warm_up_first", lambda: None)
-    monkeypatch.setattr(app.service.startup, "warm_up_rest", lambda stop: rest.wait(60))
-    with TestClient(create_app(Settings())) as client:
-        wait_for(lambda: client.get("/readyz").json() == readiness("ready", False), 60)
-        rest.set()
-        wait_for(lambda: client.get("/readyz").json() == readiness("ready", True), 60)
-
-
-def test_a_failure_to_compile_ahead_is_logged_and_the_service_stays_ready(monkeypatch, caplog):
-    def rest(stop):
-        raise RuntimeError("disk full")
-
-    monkeypatch.setattr(app.service.startup, "warm_up_first", lambda: None)
-    monkeypatch.setattr(app.service.startup, "warm_up_rest", rest)
-    with TestClient(create_app(Settings())) as client:
-        wait_for(lambda: "disk full" in caplog.text)
-        assert client.get("/readyz").status_code == 200
 
 
 @pytest.mark.parametrize("page", ["/", "/docs"])
@@ -209,27 +156,12 @@ def test_static_files_name_no_other_host():
     assert "validatorUrl: null" in (static_folder() / "docs.js").read_text()
 
 
-def prepared(client: TestClient, method: str, path: str, body: str) -> httpx2.Response:
-    """The answer to a request, asked again as long as its kernels are compiled, as after a change of them."""
-    headers = {"Content-Type": "application/json"} if body else {}
-    answer = client.request(method, path, content=body, headers=headers)
-
-    def settled() -> bool:
-        nonlocal answer
-        if answer.json().get("type") != "urn:kinboard:problem:preparing":
-            return True
-        answer = client.request(method, path, content=body, headers=headers)
-        return False
-
-    wait_for(settled, 300)
-    return answer
-
-
 def test_the_examples_of_the_landing_page_work(client):
     pattern = r'data-method="(\w+)" data-path="([^"]+)">[^<]+<code hidden>([^<]*)</code>'
     answers = {}
     for method, path, body in re.findall(pattern, client.get("/").text):
-        answer = prepared(client, method, f"/{path}", body)
+        headers = {"Content-Type": "application/json"} if body else {}
+        answer = client.request(method, f"/{path}", content=body, headers=headers)
         assert answer.status_code == 200, answer.text
         answers[urlsplit(path).path.rsplit("/", 1)[1]] = answer.json()
     assert set(answers) == {"fk", "ik", "summary"}
@@ -321,9 +253,9 @@ SOON = 30  # s; a loaded machine may need most of it
 @pytest.mark.parametrize(
     ("ready", "stop"),
     [
-        pytest.param(False, signal.SIGINT, id="while warming, SIGINT"),
+        pytest.param(False, signal.SIGINT, id="while starting, SIGINT"),
         pytest.param(True, signal.SIGTERM, id="when ready, SIGTERM"),
-        pytest.param(False, signal.SIGTERM, id="while warming, SIGTERM", marks=pytest.mark.slow),
+        pytest.param(False, signal.SIGTERM, id="while starting, SIGTERM", marks=pytest.mark.slow),
         pytest.param(True, signal.SIGINT, id="when ready, SIGINT", marks=pytest.mark.slow),
     ],
 )

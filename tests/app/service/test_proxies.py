@@ -159,7 +159,7 @@ def service() -> Iterator[int]:
     settings = Settings(root_path="/kinboard", token=TOKEN, trusted_proxies=("127.0.0.1",))
     app = create_app(settings)
     with serve(app, settings) as port:
-        wait_for(lambda: app.state.startup.status != "warming", seconds=600)
+        wait_for(lambda: app.state.startup.status != "starting", seconds=600)
         assert app.state.startup.status == "ready"
         yield port
 

@@ -403,9 +403,9 @@ def test_a_visitor_before_the_viewer_has_started(port, bridge):
     bridge.viewer = None
     page = httpx2.get(f"http://127.0.0.1:{port}/viewer/", trust_env=False)
     assert page.status_code == 503
-    assert "warming up" in page.text
+    assert "is starting" in page.text
     assert page.headers["retry-after"] == "1"
-    assert turned_away(port) == (1013, "The viewer is warming up.")
+    assert turned_away(port) == (1013, "The viewer is starting.")
 
 
 def turned_away(port: int) -> tuple[int, str]:

@@ -28,7 +28,6 @@ SCARA, SRS = STORE.get("scara"), STORE.get("redundant7-craig")
 
 @pytest.fixture(scope="module")
 def server() -> ViewerServer:
-    kin.warm_up()
     return ViewerServer(STORE, Settings(), Clouds())
 
 

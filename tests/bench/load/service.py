@@ -17,7 +17,7 @@ from pathlib import Path
 import psutil
 
 ROOT = Path(__file__).parents[3]
-_WARM_UP = 300.0  # seconds; kernels may have to be compiled
+_START = 120.0  # seconds; a checkout may have to compile the kernels
 # Seconds of rest before a service counts as idle: on a busy machine one that works may get no turn for a second.
 _IDLE = 4.0
 
@@ -98,19 +98,19 @@ def serve(**settings: str) -> Iterator[Service]:
 
 
 def _wait_until_ready(port: int) -> None:
-    end = time.monotonic() + _WARM_UP
+    end = time.monotonic() + _START
     while time.monotonic() < end:
         try:
             with _direct.open(f"http://127.0.0.1:{port}/readyz", timeout=20):
                 return
         except OSError:  # refused, or 503
             time.sleep(0.05)
-    raise RuntimeError(f"the service was not ready within {_WARM_UP:g} s")
+    raise RuntimeError(f"the service was not ready within {_START:g} s")
 
 
 def _wait_until_idle(service: Service) -> None:
-    """Kernels that nobody needs at first are compiled or loaded behind the visitors: they are not our subject."""
-    end = time.monotonic() + _WARM_UP
+    """What is imported once the service is ready is not our subject."""
+    end = time.monotonic() + _START
     since, before = time.monotonic(), service.seconds()
     while time.monotonic() < end:
         time.sleep(0.5)
@@ -119,7 +119,7 @@ def _wait_until_idle(service: Service) -> None:
             since, before = time.monotonic(), now
         elif time.monotonic() - since >= _IDLE:
             return
-    raise RuntimeError(f"the service was not idle within {_WARM_UP:g} s")
+    raise RuntimeError(f"the service was not idle within {_START:g} s")
 
 
 _direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))

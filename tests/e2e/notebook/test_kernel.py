@@ -21,7 +21,7 @@ from playwright.sync_api import Browser, expect
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 ROOT = Path(__file__).parents[3]
-PATIENCE = 120.0  # s for a cell; the service may compile kernels
+PATIENCE = 60.0  # s for a cell
 
 
 @pytest.fixture

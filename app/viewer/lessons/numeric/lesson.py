@@ -26,7 +26,6 @@ from app.viewer.lessons.numeric.questions import outline
 from app.viewer.lessons.numeric.settings import NumericSettings
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
-from kin.warmup import ALL
 
 INTERVAL = 0.08  # s between two starts of a moving arm
 PACE = 0.35  # s between two iterates that are played
@@ -41,7 +40,6 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     key = "numeric"
     title = "Numeric IK"
-    kernels = (ALL,)
     about = "Newton, transpose and damping from a start that you drag: iterates, failures, basins."
     outline = staticmethod(outline)
     settings_of, facts_of = NumericSettings, NumericFacts

@@ -41,7 +41,6 @@ from app.viewer.views.templates import render
 from kin import IKResult, Robot
 from kin.transforms import Array
 from kin.units import Units
-from kin.warmup import ALL
 
 CONE_INTERVAL = 0.2
 POLL = 0.2  # s between two looks at a map that is computed
@@ -57,7 +56,6 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
 
     key = "postures"
     title = "Postures"
-    kernels = (ALL,)
     about = "All ways to reach a target, and the reason if there is none."
     outline = staticmethod(outline)
     settings_of, facts_of = PosturesSettings, PosturesFacts

@@ -34,7 +34,6 @@ from app.viewer.self_motion import INSET, SMOOTH, circular, ends, range_of, self
 from kin import IKResult
 from kin.ik import Redundancy
 from kin.transforms import Array
-from kin.warmup import ALL
 
 FRAME = 1 / 30
 QUIET = 0.2  # seconds at rest before the joint limits at the ends of the range are determined
@@ -51,7 +50,6 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
 
     key = "redundancy"
     title = "Redundancy"
-    kernels = (ALL,)
     about = "How seven joints move while the tool stays where it is."
     outline = staticmethod(outline)
     settings_of, facts_of = RedundancySettings, RedundancyFacts

@@ -24,7 +24,6 @@ from app.viewer.lessons.trajectories.questions import outline
 from app.viewer.scene.meshes import body
 from kin import Robot
 from kin.transforms import Array
-from kin.warmup import MOTIONS
 
 PATHS_HINT = "PTP in blue, LIN in orange: the two ways between the poses of the step Joints or tool"
 COLOURS = {"ptp": (0, 114, 178), "lin": (213, 94, 0)}
@@ -58,7 +57,6 @@ class TrajectoriesLesson(DeclaredFeature[TrajectoriesSettings, TrajectoriesFacts
 
     key = "trajectories"
     title = "Trajectories"
-    kernels = (MOTIONS,)
     about = "How a motion becomes a function of time: profiles, PTP and LIN, singularities, jerk."
     outline = staticmethod(outline)
     settings_of, facts_of = TrajectoriesSettings, TrajectoriesFacts

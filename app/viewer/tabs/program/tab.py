@@ -44,7 +44,6 @@ from kin.path import PathPostures
 from kin.transforms import Array
 from kin.typed import EntryError
 from kin.units import general
-from kin.warmup import MOTIONS
 
 REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again
 REPORT = 0.1  # s between two looks at the progress of a search
@@ -74,7 +73,6 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
     key = "program"
     title = "Program"
     shared = True
-    kernels = (MOTIONS,)
     settings_of, facts_of = ProgramSettings, ProgramFacts
     messages = frozenset({*ROWS, *ACTS})
     undo: ClassVar[dict[str, str]] = {"on_way": "Find a way"}

@@ -36,7 +36,6 @@ from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from kin.transforms import Array
 from kin.units import grouped
-from kin.warmup import CAPABILITY, CLOUDS
 from kin.workspace import CapabilityMap
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
@@ -52,7 +51,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     title: ClassVar[str] = "Workspace"
     shared: ClassVar[bool] = True
     messages = frozenset({"map"})
-    kernels = (CLOUDS,)
     settings_of, facts_of = WorkspaceSettings, Facts
 
     def __init__(self, stage: Stage) -> None:
@@ -165,10 +163,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         else:
             super().handle(key, value)
         self.due = 0.0  # the next tick shows everything, and determines when to wake up
-
-    @classmethod
-    def kernels_of(cls, key: Hashable) -> tuple[str, ...]:
-        return (CAPABILITY,) if isinstance(key, tuple) and key[0] == "capability" else cls.kernels
 
     def on_robot(self) -> None:
         self._runner.end()

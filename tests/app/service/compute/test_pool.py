@@ -225,12 +225,13 @@ def test_a_stop_of_the_service_ends_what_is_computed(pool, after):
         asyncio.run(stopped())
 
 
-def test_each_process_is_prepared_and_a_failure_is_raised(stand_ins):
+def test_each_process_is_waited_for_and_one_that_does_not_start_is_an_error(stand_ins, monkeypatch):
     pool = stand_ins(2)
-    pool.prepare(pool_jobs.pid)
+    pool.wait()
     assert all(each.pid for each in pool.processes)
+    monkeypatch.setattr(pool_jobs, "STAND_IN", "raise SystemExit(1)")
     with pytest.raises(module.LostError):
-        pool.prepare(pool_jobs.ends)
+        stand_ins().wait()
 
 
 def test_the_memory_of_the_processes_is_known(stand_ins):

@@ -5,31 +5,20 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Iterator
 
 import pytest
 from fake_browser import FakeBrowser
-from live_server import serve_viewer
 
 import kin
-from app.shared.clouds import Clouds
-from app.shared.settings import Settings, static_folder
+from app.shared.settings import static_folder
 from app.shared.store import Store
 from app.viewer.own_arm import label, own_arm
-from app.viewer.server import ViewerServer
 from app.viewer.tabs.robot.presets import PRESETS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
 PIONEER = STORE.robots[0]
-
-
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    kin.warm_up()
-    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as served:
-        yield served
 
 
 def offered(tab: FakeBrowser) -> set[str]:

@@ -13,7 +13,6 @@ import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
-import kin
 from app.exercises import Exercise, Exercises
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
@@ -37,7 +36,6 @@ QUESTION = next(key for key, one in VELOCITY.outline(UR5, Units()).questions() i
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[int]:
-    kin.warm_up()
     with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port:
         yield port
 

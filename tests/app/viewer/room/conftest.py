@@ -9,7 +9,6 @@ import pytest
 from live_server import serve_viewer
 from students import Room
 
-import kin
 from app.classroom import Hub
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
@@ -20,7 +19,6 @@ from app.viewer.server import ViewerServer
 @pytest.fixture(scope="module")
 def rooms_served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Hub]]:
     data: Path = tmp_path_factory.mktemp("rooms")
-    kin.warm_up()
     hub = Hub(data)
     viewer = ViewerServer(Store(), Settings(data=data), Clouds(), classroom=hub)
     with serve_viewer(viewer) as port:

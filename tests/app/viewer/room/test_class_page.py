@@ -6,7 +6,6 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from app.classroom.courses import Course, Item, to_data
 from app.exercises import Exercises
 from app.live import Line, Lines
 from app.shared.clouds import Clouds
-from app.shared.preparation import Preparation
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.room.following import decoded
@@ -32,7 +30,7 @@ from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
 from app.viewer.room.wall import DRIVEN, PADS
 from app.viewer.server import ViewerServer
-from app.viewer.session.state import PageState, decode, encode
+from app.viewer.session.state import decode
 from app.viewer.session.worker.threads import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -901,30 +899,6 @@ def test_a_student_comes_back_to_the_seat(room: Class) -> None:
     assert "you are Ann" in again.html
     teacher.settle()
     assert teacher.html.count('data-guide-do="pick"') == 1
-
-
-def test_a_student_whose_arm_is_being_compiled_is_in_the_class(room):
-    preparation = Preparation()
-    preparation.begin()
-    viewer = ViewerServer(Store(), Settings(), Clouds(), classroom=room.hub, preparation=preparation)
-    ticket = room.hub.rooms.join(room.room.code, "Ann")
-    attendance = room.hub.attend(Ticket(ticket.room), lambda: None)
-    with (
-        serve_viewer(viewer) as port,
-        closing(
-            FakeBrowser(
-                port,
-                memory=json.dumps({"state": encode(PageState(robot="ur5"))}),
-                additional_headers={"Cookie": f"{COOKIE}={room.hub.rooms.tokens.sign(ticket)}"},
-            )
-        ) as student,
-    ):
-        student.wait(lambda: "Preparing" in (student.shown.get("preparing") or ""))
-        student.wait(lambda: [(seat.alias, seat.came) for seat in attendance.room.seats] == [("Ann", True)])
-        assert student.shown.get("preparing")
-        preparation.finish()
-        student.wait(lambda: "data-class-bar" in student.html)
-    attendance.leave()
 
 
 def test_a_database_that_does_not_answer_holds_up_no_page_outside_of_the_room(room, monkeypatch):

@@ -41,7 +41,6 @@ SERIAL = itertools.count(1)
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[ViewerServer, int]]:
     monkeypatch.setattr(persistence, "SAVE_AFTER", 0.1)
-    kin.warm_up()
     viewer = ViewerServer(STORE, Settings(), Clouds())
     with serve_viewer(viewer) as port:
         yield viewer, port

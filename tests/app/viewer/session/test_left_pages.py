@@ -9,7 +9,6 @@ import weakref
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
-import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -19,7 +18,6 @@ WITHIN = 10.0  # s
 
 
 def test_pages_that_were_left_are_forgotten() -> None:
-    kin.warm_up()
     viewer = ViewerServer(Store(), Settings(), Clouds())
     pages: weakref.WeakSet[object] = weakref.WeakSet()
     with serve_viewer(viewer) as port:

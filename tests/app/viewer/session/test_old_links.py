@@ -25,7 +25,6 @@ if __name__ == "__main__":
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
-import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -178,8 +177,7 @@ def restored(port: int, link: str) -> PageState:
     """What a page has after it has opened a link and rested."""
     tab = FakeBrowser(port, memory=json.dumps({"address": "http://127.0.0.1/", "state": link}))
     with closing(tab):
-        # On a new machine, a page waits for what its lesson compiles.
-        tab.wait(lambda: any(node["type"] == "TransformControlsMessage" for node in tab.nodes.values()), 300.0)
+        tab.wait(lambda: any(node["type"] == "TransformControlsMessage" for node in tab.nodes.values()))
         tab.settle()
         before = len(tab.kept)
         # Any change makes the page store its state; this one is taken back.
@@ -238,7 +236,6 @@ def test_a_recorded_link_restores_what_it_did(port: int, case: str) -> None:
 
 
 if __name__ == "__main__":
-    kin.warm_up()
     with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as number:
         for name, state in CASES.items():
             text = encode(state)

@@ -406,7 +406,6 @@ class Counter(Feature):
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    kin.warm_up()
     before, page.TABS = page.TABS, (Counter,)
     with serve_viewer(ViewerServer(STORE, Settings(token="very secret"), Clouds())) as port:
         yield port

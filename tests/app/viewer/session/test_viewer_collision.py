@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import serve_viewer
 
 import kin
-from app.shared.clouds import Clouds
-from app.shared.settings import Settings
-from app.shared.store import Store
 from app.viewer.panel.joints import label
 from app.viewer.scene.bodies.nodes import TOUCHING
-from app.viewer.server import ViewerServer
 from kin.collision.contacts import surroundings
 
 UR5 = kin.get_robot("ur5")
 FOLDED = 168.5  # degrees of the elbow: the wrist is in the upper arm
 AVOID = "Avoid collisions"
-
-
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    kin.warm_up()
-    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
-        yield port
 
 
 def red(tab: FakeBrowser) -> set[str]:

@@ -33,7 +33,6 @@ SRS = STORE.get("redundant7-craig")
 
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[tuple[ViewerServer, int]]:
-    kin.warm_up()
     server = ViewerServer(STORE, Settings(), Clouds())
     with serve_viewer(server) as port:
         yield server, port

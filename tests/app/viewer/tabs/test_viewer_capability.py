@@ -172,7 +172,6 @@ class Visitor(FakeBrowser):
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[tuple[int, Maps, ViewerServer]]:
-    kin.warm_up()
     clouds, maps = Clouds(), Maps(threads=2)
     server = ViewerServer(STORE, Settings(), clouds, maps)
     with serve_viewer(server) as port:

@@ -37,7 +37,6 @@ UR5 = STORE.get("ur5")
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    kin.warm_up()
     clouds, maps = Clouds(), Maps(threads=1)
     server = ViewerServer(STORE, Settings(), clouds, maps)
     with serve_viewer(server) as opened:

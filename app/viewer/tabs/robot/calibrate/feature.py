@@ -46,7 +46,6 @@ from app.viewer.views.templates import render
 from kin import KinematicsError, Robot
 from kin.calibration.fixtures import PAPER
 from kin.calibration.model import fewest, suited
-from kin.warmup import COLLISIONS
 
 LOOK_AGAIN = 0.2  # s between two looks at the connected arm, and at what is computed
 REST = 0.3  # s after the last touch until a fit begins
@@ -116,7 +115,6 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     key = "calibrate"
     title = "Calibrate by touching"
     settings_of, facts_of = CalibrateSettings, CalibrateFacts
-    kernels = (COLLISIONS,)
     undo: ClassVar[dict[str, str]] = {
         "on_plan": "Postures to touch in",
         "on_read": "Touch",

@@ -5,18 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import serve_viewer
 
 import kin
-from app.shared.clouds import Clouds
-from app.shared.settings import Settings
-from app.shared.store import Store
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.inverse import formulas, views, words
 from app.viewer.lessons.inverse.arm import Arm, arm_of
@@ -26,7 +21,6 @@ from app.viewer.lessons.inverse.questions import outline, outline_of
 from app.viewer.lessons.inverse.shapes import Angle, Length, joints_of, shapes
 from app.viewer.lessons.inverse.sheet import Derivation
 from app.viewer.lessons.inverse.tree import tree
-from app.viewer.server import ViewerServer
 from kin import Robot
 from kin.transforms import Array, frame_from_approach
 from kin.units import RADIANS, Units
@@ -425,12 +419,6 @@ def test_every_answer_is_the_value_of_the_core() -> None:
 
 
 # The page
-
-
-@pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as at:
-        yield at
 
 
 def say(tab: FakeBrowser, kind: str, value: object, *rest: object) -> None:
