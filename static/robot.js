@@ -8,8 +8,8 @@
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
-  const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
   const revision = () => Number(part("table")?.dataset.revision ?? 0);
+  const anyWrong = () => document.querySelector("[data-arm] [aria-invalid=true]") !== null;
   const send = (key, value, done) => channel.send("feature", ["robot", key, value], done);
 
   // Typed cells
@@ -158,22 +158,6 @@
     cell.focus({ preventScroll: true });
   }
 
-  // What is wrong
-
-  let wrong = null;
-  function markWrong() {
-    const text = part("wrong")?.dataset.wrong ?? "{}";
-    if (text === wrong?.text && cells().every((cell) => cell.marked === text)) return;
-    const found = JSON.parse(text);
-    wrong = { text, any: Object.keys(found).length > 0 };
-    for (const cell of cells()) {
-      const message = found[cell.dataset.cell];
-      cell.marked = text;
-      cell.ariaInvalid = message ? "true" : null;
-      cell.title = message ?? "";
-    }
-  }
-
   // Keys
 
   function neighbour(cell, down, right) {
@@ -193,12 +177,12 @@
     let to = null;
     if (undo === "z" || undo === "y") {
       flush();
-      if (wrong?.any) send(["discard"], null);
+      if (anyWrong()) send(["discard"], null);
       else channel.send(undo === "y" || event.shiftKey ? "redo" : "undo");
     } else if (event.altKey && inTable && ["ArrowUp", "ArrowDown", "Enter"].includes(event.key)) {
       const action = { ArrowUp: "up", ArrowDown: "down", Enter: "add" }[event.key];
       if (part("table").querySelector(`[data-arm-do="${action}"]`).ariaDisabled !== "true") change(action);
-    } else if (event.key === "Escape" && wrong?.any) {
+    } else if (event.key === "Escape" && anyWrong()) {
       flush();
       send(["discard"], null);
     } else if (!cell.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -262,7 +246,6 @@
     keepTyped();
     restore();
     mark();
-    markWrong();
     resized.observe(scroller());
     showMore();
   });

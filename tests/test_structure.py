@@ -330,7 +330,6 @@ FIELDS = {
     "Guide": 7,
     "Member": 6,
     "Practising": 11,
-    "RobotTab": 6,
     "Workspace": 2,
 }
 FEATURE = re.compile(r"(Feature|Lesson)\b")

@@ -21,6 +21,8 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, ParamSpec, TypeVar, cast
 
+import viser
+
 from app.viewer.arm import Arm
 from app.viewer.declared.facts import ArmReads, Facts
 from app.viewer.declared.fields import Settings
@@ -36,6 +38,7 @@ from kin.transforms import Array
 
 S = TypeVar("S", bound=Settings)
 F = TypeVar("F", bound=Facts[Any])
+D = TypeVar("D", bound="DeclaredFeature[Any, Any]")
 P = ParamSpec("P")
 # The first parts of keys that `DeclaredFeature.handle` takes itself: they name fields and methods of the feature.
 OWN = frozenset({"at", "do", "done", "drag"})
@@ -56,7 +59,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
         shown_at: when the panel was last made to show them (`time.perf_counter`).
 
     Args:
-        within: the feature that this one is a part of, which gets its events under its key and calls its methods.
+        within: the feature that this one is a part of, which gets its events under its key and calls its methods:
+            `adopt` has it do so.
     """
 
     settings_of: ClassVar[type[Settings]]
@@ -70,6 +74,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
             raise TypeError(f"{cls.__name__}.messages must not contain {', '.join(sorted(cls.messages & OWN))}")
 
     def __init__(self, stage: Stage, within: Feature | None = None) -> None:
+        self._parts: dict[str, DeclaredFeature[Any, Any]] = {}
         super().__init__(stage)
         self._within = within
         self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
@@ -85,6 +90,16 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.built()
         self.started()
         self._begin()
+
+    @property
+    def due(self) -> float | None:
+        """See `Feature`: its own, or that of a part, whichever is earlier."""
+        dues = self._due, *(part.due for part in self._parts.values())
+        return min((due for due in dues if due is not None), default=None)
+
+    @due.setter
+    def due(self, seconds: float | None) -> None:
+        self._due = seconds
 
     # To be overridden
 
@@ -126,7 +141,28 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if (error := self.facts.work(key).error) is not None:
             raise error
 
+    @property
+    def place(self) -> viser.GuiFolderHandle:
+        """The folder with its controls."""
+        return self._panel.top
+
     # For subclasses
+
+    def adopt(self, part: D) -> D:
+        """Have a part follow from now on; its state is kept under its key."""
+        self._parts[part.key] = part
+        return part
+
+    def for_parts(self, action: Callable[[DeclaredFeature[Any, Any]], object]) -> None:
+        """Call every part."""
+        for part in self._parts.values():
+            action(part)
+
+    def restore_parts(self, state: dict[str, object]) -> None:
+        """Restore every part of which the state of the feature has one."""
+        for name, part in self._parts.items():
+            if isinstance(saved := state.get(name), dict):
+                part.restore(saved)
 
     def change(self, **values: Any) -> None:
         """Set fields."""
@@ -251,6 +287,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
                     getattr(self, name)(*arguments)
             case ("done", ()):
                 self._go_on(time.perf_counter())
+                self.for_parts(lambda part: part.handle(key, value))
+            case (str(name), inner) if name in self._parts:
+                self._parts[name].handle(inner, value)
             case ("drag", (str(name), *arguments), int()):
                 getattr(self, name)(*arguments, value)
             case _:
@@ -271,27 +310,35 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.invalidate()
         self.started()
         self._begin()
+        self.for_parts(lambda part: part.on_robot())
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._follow()
+        self.for_parts(lambda part: part.on_pose(T_base_tool))
 
     def on_result(self, result: IKResult) -> None:
         self._follow()
+        self.for_parts(lambda part: part.on_result(result))
 
     def on_request(self) -> None:
         self._follow()
+        self.for_parts(lambda part: part.on_request())
 
     def on_obstacles(self) -> None:
         self._follow()
+        self.for_parts(lambda part: part.on_obstacles())
 
     def on_style(self) -> None:
         self._begin()
+        self.for_parts(lambda part: part.on_style())
 
     def on_activity(self) -> None:
         if self._withheld != self.stage.activity.withheld and not self._outdated:
             self._begin()
+        self.for_parts(lambda part: part.on_activity())
 
     def tick(self, now: float) -> None:
+        self.for_parts(lambda part: None if part.due is None else part.tick(now))
         self.due, again = None, None
         self.invalidate()
         if self._stale or (self.facts is not self.read and now - self.shown_at >= self._interval):
@@ -309,19 +356,45 @@ class DeclaredFeature(Feature, Generic[S, F]):
             self.due = min((one for one in waits if one is not None), default=None)
 
     def state(self) -> dict[str, object]:
-        return self.settings.state()
+        return {**self.settings.state(), **{name: part.state() for name, part in self._parts.items()}}
 
     def restore(self, state: dict[str, object]) -> None:
         self.settings = self.settings.restored(state, self.stage.now.robot)
         self.rewrite()
         self._begin()
+        self.restore_parts(state)
 
     def on_leave(self) -> None:
         self._runner.end()
+        self.for_parts(lambda part: part.on_leave())
 
     def remove(self) -> None:
+        self.for_parts(lambda part: part.remove())
         self._runner.end()
         if self.legend() is not None:
             self.stage.show_legend("")
         self._scene.remove()
         self._panel.remove()
+
+
+class OpenableFeature(DeclaredFeature[S, F]):
+    """A feature that lives as long as the page, so that what was done in it is kept while it is hidden.
+
+    Attributes:
+        shown: whether it is on show.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.shown = False
+        super().__init__(stage)
+
+    def show(self) -> None:
+        """Show it."""
+        self.shown = True
+        self.refresh()
+
+    def hide(self) -> None:
+        """Hide it."""
+        if self.shown:
+            self.shown = False
+            self.refresh()

@@ -111,9 +111,9 @@ class Progress:
 
 @dataclass(slots=True, eq=False)
 class Native:
-    """What no node describes: `build` makes it in the open container, once; what it returns has `remove`."""
+    """What no node describes: `build` makes it once, at the order that it gets; what it returns has `remove`."""
 
-    build: Callable[[], Any]
+    build: Callable[[float], Any]
     key: str = ""
 
 
@@ -158,6 +158,11 @@ class PanelView:
         self._live: dict[int, _Mounted] = {}
         self._serials = count(1)
         self._presses = 0
+
+    @property
+    def top(self) -> viser.GuiFolderHandle:
+        """The folder that holds them."""
+        return self._top
 
     def show(
         self, nodes: Sequence[Node], settings: Settings, robot: Robot, units: Units, write: bool = False
@@ -307,7 +312,7 @@ class PanelView:
             case Progress(value=value):
                 one.handle = gui.add_progress_bar(value, order=order)
             case Native(build=build):
-                one.handle = build()
+                one.handle = build(order)
         return one
 
     def _update(self, node: Node, one: _Mounted) -> None:

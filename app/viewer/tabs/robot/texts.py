@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from app.viewer.tabs.robot.edits import Cell
 from kin.typed import LONGEST, ReadError, read
@@ -15,33 +17,52 @@ _PLAIN = re.compile(r"\s*[-+−]?[0-9]*[.,]?[0-9]*\s*")  # shown as any number i
 _CELL = re.compile(r"([0-9]{1,2}|arm|tool|base|frame-[0-9]) ([a-z]{1,12})")
 
 
+@dataclass(frozen=True)
 class Texts:
-    """The texts of one page, by cell. The newest `MOST` are kept."""
+    """The texts of one page.
 
-    def __init__(self) -> None:
-        self._texts: dict[Cell, str] = {}
+    Attributes:
+        typed: the newest `MOST` expressions, by cell.
+        wrong: what was typed into cells and is not valid, and what is wrong with it.
+    """
 
-    def remember(self, cell: Cell, text: str) -> None:
-        """A valid text was typed."""
-        self._texts.pop(cell, None)
-        if cell[1] not in ("kind", "name", "mounting") and not _PLAIN.fullmatch(text):
-            self._texts[cell] = text.strip()
-        while len(self._texts) > MOST:
-            del self._texts[next(iter(self._texts))]
+    typed: Mapping[Cell, str] = field(default_factory=dict)
+    wrong: Mapping[Cell, tuple[str, str]] = field(default_factory=dict)
 
-    def shown(self, cell: Cell, value: float, unit: Unit) -> str | None:
-        """What was typed, if that is the value (rad or m) of the cell; None: it is not, or nothing was typed."""
-        text = self._texts.get(cell)
-        if text is None:
-            return None
-        try:
-            same = math.isclose(read(text, unit), value, rel_tol=1e-12, abs_tol=1e-12)
-        except ReadError:
-            return None
-        return text if same else None
+    @classmethod
+    def of(cls, state: object) -> Texts:
+        """The texts of a link, as far as they can be texts of cells."""
+        found = cls()
+        for key, text in list(state.items())[:MOST] if isinstance(state, dict) else []:
+            match = _CELL.fullmatch(key)
+            if match is not None and isinstance(text, str) and len(text) <= LONGEST:
+                found = found.taken({(int(match[1]) if match[1].isdecimal() else match[1], match[2]): text})
+        return found
 
-    def move_rows(self, action: str, index: int) -> None:
-        """Rows were changed: ``"add"`` below row `index`, ``"remove"`` it, or move it ``"up"`` or ``"down"``."""
+    def taken(self, texts: Mapping[Cell, str]) -> Texts:
+        """With these, which are valid."""
+        typed = {cell: text for cell, text in self.typed.items() if cell not in texts}
+        for cell, text in texts.items():
+            if cell[1] not in ("kind", "name", "mounting") and not _PLAIN.fullmatch(text):
+                typed[cell] = text.strip()
+        wrong = {cell: why for cell, why in self.wrong.items() if cell not in texts}
+        return Texts(dict([*typed.items()][-MOST:]), wrong)
+
+    def refused(self, cell: Cell, text: str, why: str) -> Texts:
+        """With one that is not valid."""
+        others = {other: said for other, said in self.wrong.items() if other != cell}
+        return replace(self, wrong={**others, cell: (text, why)})
+
+    def valid(self) -> Texts:
+        """Without those that are not valid."""
+        return replace(self, wrong={})
+
+    def moved(self, action: str, index: int) -> Texts:
+        """The valid ones when rows change.
+
+        Args:
+            action: ``"add"`` a row below row `index`, ``"remove"`` it, or move it ``"up"`` or ``"down"``.
+        """
         other = index + {"up": -1, "down": 1}.get(action, 0)
 
         def place(row: int) -> int | None:
@@ -52,28 +73,31 @@ class Texts:
             return {index: other, other: index}.get(row, row)
 
         moved: dict[Cell, str] = {}
-        for (where, column), text in self._texts.items():
+        for (where, column), text in self.typed.items():
             to = place(where) if isinstance(where, int) else where
             if to is not None:
                 moved[to, column] = text
-        self._texts = moved
+        return Texts(moved)
+
+    def shown(self, cell: Cell, value: float, unit: Unit) -> str | None:
+        """What was typed, if that is the value (rad or m) of the cell; None: it is not, or nothing was typed."""
+        text = self.typed.get(cell)
+        if text is None:
+            return None
+        try:
+            same = math.isclose(read(text, unit), value, rel_tol=1e-12, abs_tol=1e-12)
+        except ReadError:
+            return None
+        return text if same else None
 
     def state(self) -> dict[str, str]:
         """The texts as JSON, for a link; those that make it too long are left out."""
         found: dict[str, str] = {}
         left = IN_LINK
-        for (where, column), text in reversed(self._texts.items()):
+        for (where, column), text in reversed([*self.typed.items()]):
             key = f"{where} {column}"
             left -= len(key) + len(text)
             if left < 0:
                 break
             found[key] = text
         return dict(reversed(found.items()))
-
-    def restore(self, state: object) -> None:
-        """The texts of a link, as far as they can be texts of cells."""
-        self._texts = {}
-        for key, text in list(state.items())[:MOST] if isinstance(state, dict) else []:
-            match = _CELL.fullmatch(key)
-            if match is not None and isinstance(text, str) and len(text) <= LONGEST:
-                self.remember((int(match[1]) if match[1].isdecimal() else match[1], match[2]), text)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import kin
-from app.shared.answers.inspection import InspectionAnswer
+from app.shared.answers.inspection import InspectionAnswer, inspect
 from app.viewer.frames import MOST as MOST_FRAMES
 from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MB, MOST_BYTES
@@ -55,6 +54,8 @@ _HEADS = {
     "high": ("to", "Upper limit of the joint"),
     "name": ("name", "Name of the joint"),
 }
+# A field, as most are.
+_PLAIN = {"id": "", "hint": "", "longest": 60, "text": False, "variable": False, "options": (), "none": False}
 _MOTIONS = {
     0: "none: no joint moves the tool",
     1: "one: the tool moves along one curve",
@@ -68,7 +69,7 @@ def text_of(value: float, unit: Unit) -> str:
     return unit.short(value, DECIMALS)
 
 
-def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str:
+def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot], texts: Texts) -> str:
     """What the arm was made from, its name and its convention. No arm is offered twice."""
     names = {each.name for each in robots}
     return render(
@@ -78,7 +79,7 @@ def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str
         mine=mine,
         presets=[(key, title) for key, title in TITLES.items() if key == chosen or title not in names],
         robots=[(r.id, r.name) for r in robots],
-        name=robot.name,
+        name=_field(("arm", "name"), robot.name, texts, id="kb-arm-name", label="", text=True),
         convention=robot.convention,
     )
 
@@ -105,7 +106,7 @@ def motion(robot: Robot, units: Units, texts: Texts) -> str:
             cell = (index, column)
             hint = general(float(getattr(limits, column)[joint]) * units.of(angle).scale) if value is None else ""
             shown = "" if value is None else _text(cell, value, units, angle, texts)
-            cells.append({"key": f"{index} {column}", "value": shown, "hint": hint, "label": name_of(cell)})
+            cells.append(_field(cell, shown, texts, hint=hint))
         rows.append({"number": index + 1, "title": row.name, "cells": cells})
     names = {units.of(turning).name for turning in robot.revolute.tolist()}
     per = " or ".join(sorted(names))
@@ -121,22 +122,28 @@ def withheld() -> str:
     return render("robot/withheld")
 
 
+def _field(cell: Cell, value: str, texts: Texts, **more: Any) -> dict[str, Any]:
+    """A field with a value, or with what was typed there and is not valid; for the macro *field*."""
+    where, column = cell
+    text, wrong = texts.wrong.get(cell, (value, ""))
+    return {**_PLAIN, "key": f"{where} {column}", "label": name_of(cell), "value": text, "wrong": wrong, **more}
+
+
 def _cell(index: int, row: Joint, column: str, units: Units, texts: Texts) -> dict[str, Any]:
-    cell: dict[str, Any] = {"key": f"{index} {column}", "label": name_of((index, column)), "value": "", "hint": ""}
-    cell |= {"variable": False, "options": None, "none": False, "text": column == "name"}
+    cell = (index, column)
     if column == "kind":
-        return {**cell, "value": row.kind, "options": [(kind, KIND_TITLES[kind]) for kind in KINDS]}
+        return _field(cell, row.kind, texts, options=[(kind, KIND_TITLES[kind]) for kind in KINDS])
     if column == "name":
-        return {**cell, "value": row.name}
+        return _field(cell, row.name, texts, text=True)
     if column in ("low", "high"):
         if row.limits is None:
             ratio = f"{general(row.ratio)} × {row.follows}" if column == "low" else ""
-            return {**cell, "none": row.kind == "fixed", "hint": ratio if row.follows else "none"}
+            return _field(cell, "", texts, none=row.kind == "fixed", hint=ratio if row.follows else "none")
         limit, angle = row.limits[column == "high"], row.kind == "revolute"
-        return {**cell, "value": _text((index, column), limit, units, angle, texts)}
+        return _field(cell, _text(cell, limit, units, angle, texts), texts)
     variable = column == {"revolute": "theta", "prismatic": "d"}.get(row.kind)
-    value = _text((index, column), getattr(row, column), units, column in ANGLES, texts)
-    return {**cell, "value": value, "variable": variable}
+    value = _text(cell, getattr(row, column), units, column in ANGLES, texts)
+    return _field(cell, value, texts, variable=variable)
 
 
 def _text(cell: Cell, value: float, units: Units, is_angle: bool, texts: Texts) -> str:
@@ -146,22 +153,11 @@ def _text(cell: Cell, value: float, units: Units, is_angle: bool, texts: Texts) 
     return text_of(value, unit) if typed is None else typed
 
 
-def wrong(messages: Mapping[Cell, str]) -> str:
-    """What is wrong in the table, and in which cells of all parts, for ``static/robot.js``."""
-    cells = {" ".join(map(str, cell)): message for cell, message in messages.items()}
-    return render(
-        "robot/wrong", part="wrong", cells=json.dumps(cells), messages=_said(messages, ("table", "start"))
-    )
-
-
-def wrong_in(part: str, messages: Mapping[Cell, str]) -> str:
-    """What is wrong in another part of the tab."""
-    return render("robot/wrong", part=f"wrong-{part}", cells="", messages=_said(messages, (part,)))
-
-
-def _said(messages: Mapping[Cell, str], parts: Sequence[str]) -> list[str]:
-    """The messages about cells of these parts of the tab, with the names of the cells."""
-    return [_sentence(cell, message) for cell, message in messages.items() if part_of(cell) in parts]
+def wrong(part: str, texts: Texts) -> str:
+    """What is wrong in a part of the tab; in the table and above it for the part `wrong`."""
+    parts = ("table", "start") if part == "wrong" else (part.removeprefix("wrong-"),)
+    said = [_sentence(cell, why) for cell, (_, why) in texts.wrong.items() if part_of(cell) in parts]
+    return render("robot/wrong", part=part, messages=said)
 
 
 def _sentence(cell: Cell, message: str) -> str:
@@ -169,8 +165,9 @@ def _sentence(cell: Cell, message: str) -> str:
     return f"{words[0].upper()}{words[1:]}."
 
 
-def about(found: InspectionAnswer, robot: Robot, units: Units) -> str:
+def about(robot: Robot, units: Units) -> str:
     """What the arm is, in plain words."""
+    found = inspect(robot)
     facts = [
         _fact("Joints", _joints(robot)),
         _fact("Axes", _axes(found)),
@@ -259,24 +256,21 @@ def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:
     poses += [(f"frame-{i}", each.name, each.values) for i, each in enumerate(page.workpieces)]
     for frame, title, values in poses:
         cells = [
-            {
-                "key": f"{frame} {axis}",
-                "value": _text((frame, axis), value, units, i >= 3, texts),
-                "label": name_of((frame, axis)),
-            }
+            _field((frame, axis), _text((frame, axis), value, units, i >= 3, texts), texts)
             for i, (axis, value) in enumerate(zip(AXES, values, strict=True))
         ]
-        rows.append({"key": frame, "title": title, "cells": cells, "label": name_of((frame, "name"))})
+        name = _field((frame, "name"), title, texts, text=True, longest=24)
+        rows.append({"title": title, "cells": cells, "name": name})
     length, angle = units.lengths.name, units.angles.name
     own, fixed = rows[len(FRAMES) :], rows[: len(FRAMES)]
     full = len(own) >= MOST_FRAMES
     mount = body(robot).mount
-    held = None if robot.floor is None else _text(("arm", "floor"), robot.floor, units, False, texts)
+    hint = text_of(mount.floor, units.lengths)
+    floor = "" if robot.floor is None else _text(("arm", "floor"), robot.floor, units, False, texts)
     place = {
         "mountings": [(key, MOUNTING_TITLES[key]) for key in MOUNTINGS],
         "mounting": mount.kind,
-        "floor": held or "",
-        "hint": text_of(mount.floor, units.lengths),
+        "floor": _field(("arm", "floor"), floor, texts, id="kb-arm-floor", label="", hint=hint),
     }
     shown = {"place": place, "workpieces": own, "full": full, "length": length, "angle": angle}
     return render("robot/frames", heads=AXES, rows=fixed, **shown)
@@ -323,11 +317,12 @@ def _amount(busy: Busy) -> str:
     return f"{done} of {total} {busy.unit}".strip() if busy.total else f"{done} {busy.unit}".strip()
 
 
-def conversion(robot: Robot, other: Robot | None, units: Units) -> str:
-    """An offer to convert, or the same arm in the other convention, `other`, beside the present numbers."""
+def conversion(robot: Robot, shown: bool, units: Units) -> str:
+    """An offer to convert; if it is `shown`, the arm in the other convention beside the present numbers."""
     convention = {"standard": "modified (Craig)", "modified": "standard"}[robot.convention]
-    if other is None:
+    if not shown:
         return render("robot/convert", convention=convention, rows=())
+    other = kin.dh.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
     heads = [(_HEADS[column][0], units.of(column in ANGLES).name) for column in NUMBERS[:4]]
     rows = []
     for row, before in zip(other.rows, robot.rows, strict=True):

@@ -37,7 +37,7 @@ from app.viewer.declared.fields import (
     slider,
     vector,
 )
-from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node, Progress
+from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Native, Node, Progress
 from app.viewer.declared.scene import Lazy, SceneView, arrows, axes, bars, frame, label
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons import LESSONS
@@ -359,6 +359,45 @@ def test_a_group_of_buttons_of_which_none_is_offered_is_not_there(page: BarePage
     assert page.feature.settings.count == 7
 
 
+class Whole(DeclaredFeature[Knobs, Sums]):
+    """Has a part between two texts."""
+
+    key, title, settings_of, facts_of = "whole", "Whole", Knobs, Sums
+
+    @cached_property
+    def part(self) -> Toy:
+        return self.adopt(Toy(self.stage, self))
+
+    def at(self, order: float) -> Any:
+        self.part.place.order = order
+        return self.part.place
+
+    def panel(self) -> Sequence[Node]:
+        return [Html(str, ("above",)), Native(self.at), Html(str, ("below",))]
+
+
+def test_a_part_stands_where_it_is_declared_and_does_what_its_whole_does(page: BarePage) -> None:
+    whole = page.open(Whole)
+    shown = [item.get("label", item.get("content")) for item in page.panel()]
+    assert (shown[0], shown[1], shown[-1]) == ("above", "Frame", "below")
+    page.set("Step, mm", 12.5)
+    page.rest()
+    assert whole.part.settings.step == 0.0125, "its events come by the whole"
+    assert (whole.settings.step, whole.state()["toy"]["step"]) == (0.005, 0.0125)
+    whole.restore({"toy": {"step": 0.02}})
+    assert (whole.settings.step, whole.part.settings.step) == (0.005, 0.02)
+    page.use(STORE.get("scara"))
+    whole.on_robot()
+    page.rest()
+    assert whole.part.settings.count == 4
+    whole.part.schedule(3.0)
+    whole.due = 5.0
+    assert whole.due == 3.0, "the whole wakes for its part"
+    whole.remove()
+    assert page.panel() == []
+    assert page.scene() == []
+
+
 def test_undo_names_and_links(page: BarePage) -> None:
     toy = page.open(Toy)
     assert toy.step_name(("at", "force.on", 3)) == "Force"
@@ -451,7 +490,8 @@ def test_scripts_of_the_page_cannot_call_methods() -> None:
     """No script may send an event that `handle` takes itself, whichever these are."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(DeclaredFeature.handle)))
     cases = [case.pattern for node in ast.walk(tree) if isinstance(node, ast.Match) for case in node.cases]
-    kinds = {ast.literal_eval(one.patterns[0].value) for one in cases if isinstance(one, ast.MatchSequence)}  # type: ignore[attr-defined]
+    firsts = [one.patterns[0] for one in cases if isinstance(one, ast.MatchSequence)]
+    kinds = {ast.literal_eval(first.value) for first in firsts if isinstance(first, ast.MatchValue)}
     assert kinds == {"at", "do", "done", "drag"}
     for kind in kinds:
         with pytest.raises(TypeError, match=f"must not contain {kind}"):

@@ -78,7 +78,7 @@ class CompareFacts(Facts[CompareSettings]):
 
 
 class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
-    """The comparison of one page. Builds its elements in whatever container is open."""
+    """The comparison of one page."""
 
     key = "compare"
     title = "Compare with"
@@ -135,6 +135,11 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
 
     def started(self) -> None:
         self.start()
+
+    def on_activity(self) -> None:
+        if self._withheld != self.stage.activity.withheld:
+            self.start()
+        super().on_activity()
 
     def running(self) -> Sequence[Work]:
         s = self.settings
@@ -203,6 +208,8 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
 
     def restore(self, state: object) -> None:
         saved = state if isinstance(state, Mapping) else {}
+        if saved == self.state():
+            return
         other = reference.restored(saved["with"], self.stage.store) if "with" in saved else None
         frames = saved.get("frames")
         self.change(
