@@ -326,10 +326,8 @@ IMPORTANT = 93  # in style sheets: most override what viser or Mantine writes in
 # Private fields that features change, by class; none of all others.
 FIELDS = {
     "Capability": 1,
-    "CourseFeature": 2,
     "Guide": 7,
     "Member": 6,
-    "Practising": 11,
     "Workspace": 2,
 }
 FEATURE = re.compile(r"(Feature|Lesson)\b")

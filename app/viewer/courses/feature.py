@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Hashable
-from dataclasses import replace
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from app.classroom.courses import Course, Item, parse_course, parse_item, to_data
 from app.classroom.courses.course import MOST_ITEMS
@@ -15,72 +16,66 @@ from app.classroom.results.codes import clean_alias
 from app.viewer.activity.activity import EXERCISES, REVIEW
 from app.viewer.courses import views
 from app.viewer.courses.views import CourseView
-from app.viewer.feature import Feature, Stage, save_file, sent_text
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import OpenableFeature
+from app.viewer.declared.fields import Settings, memory
+from app.viewer.declared.panel import Html, Node
+from app.viewer.feature import Stage, save_file, sent_text
 from app.viewer.lessons import LESSONS
 from app.viewer.panel import update_html
-from app.viewer.panel.part import Block, add_html
+from app.viewer.panel.part import Block
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
 from kin.parsing import to_toml
 
 
-class CourseFeature(Feature):
+@dataclass(frozen=True)
+class CourseSettings(Settings):
+    """What is shown of courses besides the open one."""
+
+    view: CourseView = memory(CourseView(), renew=False)
+
+
+class CourseFeature(OpenableFeature[CourseSettings, Facts[CourseSettings]]):
     """The courses of the service, or the open one: followed or edited.
 
-    Its bar is above whatever the tab Learn shows; `show` and `hide` build and remove the rest.
+    Args:
+        bar: stands above whatever the tab *Learn* shows, also while the rest is hidden.
     """
 
     key = "course"
     title = "Courses"
     about = "New here? Begin with the course First steps. Make your own courses, and check results."
+    settings_of, facts_of = CourseSettings, Facts
     messages = frozenset(
         {
-            "pick",
-            "new",
-            "close",
-            "upload",
-            "edit",
-            "done",
-            "set",
-            "up",
-            "down",
-            "delete",
-            "answers",
-            "go",
-            "next",
-            "back",
-            "list",
-            "download",
-            "link",
-            "fields",
-            "recall",
+            *("pick", "new", "close", "upload", "edit", "finish", "set", "up", "down", "delete", "answers"),
+            *("go", "next", "back", "list", "download", "link", "fields", "recall"),
         }
     )
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
+    def __init__(self, stage: Stage, bar: Block) -> None:
+        self._bar = bar
         self._courses, self._progress = stage.activity.courses, stage.activity.progress
-        self._view = CourseView()
-        self._bar = add_html(stage.client.gui)
-        self._page: Block | None = None
+        super().__init__(stage)
 
     def show(self) -> None:
-        """Build the HTML in the container that is open."""
-        self._page = add_html(self.stage.client.gui)
+        """Show the list of the courses, or of the steps of the open one."""
         self._progress.at = None
-        self._update()
+        super().show()
 
-    def hide(self) -> None:
-        """Remove the HTML; the bar and the course stay."""
-        if self._page is not None:
-            self._page.remove()
-            self._page = None
+    # Declared
 
-    @property
-    def shown(self) -> bool:
-        """Whether the HTML is built."""
-        return self._page is not None
+    def panel(self) -> Sequence[Node]:
+        view, progress, known = self.settings.view, self._progress, self.stage.activity.exercises
+        update_html(self._bar, views.bar_html(progress, known))
+        if not self.shown:
+            return ()
+        if progress.course is None:
+            return [Html(str, (views.chooser_html(self._courses, view, progress.seated),))]
+        self._ask_back()
+        return [Html(str, (views.course_html(progress, known, self._courses.all, view),))]
 
     # In a room
 
@@ -102,47 +97,46 @@ class CourseFeature(Feature):
         if course == self._progress.course:
             return False
         self._open(course)
-        self._update()
+        self.schedule()
         return True
 
     # Events
 
-    def handle(self, key: Hashable, value: object) -> None:
+    def heard(self, key: Hashable, value: object) -> None:
         if not isinstance(key, tuple):
             raise InputError("course", key, "a control of the course")
         name, *rest = key
         if name in ("next", "back", "list"):
             self._walk(name)
         elif self.shown:
-            self._view.error = ""
+            self._look(error="", errs="")
             try:
                 self._act(name, rest, value)
             except KinematicsError as error:
                 text = str(error)
-                self._view.error, self._view.errs = f"{text[:1].upper()}{text[1:]}.", self._view.errs or "file"
-        if (
-            name != "set" or self._view.error or (rest and str(rest[0]).startswith(("add", "before-")))
-        ):  # what was typed is on the screen already
-            self._update()
+                self._look(error=f"{text[:1].upper()}{text[1:]}.", errs=self.settings.view.errs or "file")
+
+    def _look(self, **values: Any) -> None:
+        """Show something else of the course."""
+        self.change(view=replace(self.settings.view, **values))
 
     def _act(self, name: object, rest: list[object], value: object) -> None:
-        view, progress = self._view, self._progress
-        view.errs = ""
+        view, progress = self.settings.view, self._progress
         match name, value:
             case "pick", int() if 0 <= value < len(self._courses.all):
                 self._open(self._courses.all[value])
             case "new", _:
                 self._open(Course("My course"))
-                self._view.editing = True
+                self._look(editing=True)
             case "close", _:
-                self._view = CourseView()
+                self.change(view=CourseView())
                 progress.course = progress.at = None
                 self.stage.activity.enter_course()
             case "upload", _:
                 file, text = sent_text(value, MOST_IN_FILE)
                 self._open(parse_course(text, self._courses.exercises, file, self._courses.find))
-            case "edit" | "done", _:
-                view.editing, view.link, view.code = name == "edit", "", ""
+            case "edit" | "finish", _:
+                self._look(editing=name == "edit", link="", code="")
             case "go", int():
                 self._go(progress.go(value))
             case "recall", _ if rest and rest[0] in progress.back:
@@ -154,12 +148,12 @@ class CourseFeature(Feature):
             case "download", _:
                 self._download()
             case "link", _:
-                view.link = "" if view.link else self._link()
+                self._look(link="" if view.link else self._link())
             case _:
                 raise InputError("course", name, "a control of the course")
 
     def _open(self, course: Course) -> None:
-        self._view = CourseView()
+        self.change(view=CourseView())
         self._progress.open(course)
         self.stage.activity.enter_course()
 
@@ -189,15 +183,13 @@ class CourseFeature(Feature):
 
     def _take(self, field: object, text: str) -> None:
         """A typed code is to be checked, or an alias gets a code."""
-        view = self._view
-        view.errs = "alias" if field == "alias" else "check"
         if field == "alias":
-            view.code = ""
+            self._look(errs="alias", code="")
             self._progress.alias = clean_alias(text)
-            view.code = self._progress.code(self.stage.activity.secret)
+            self._look(code=self._progress.code(self.stage.activity.secret))
         else:
-            view.checked, view.typed = None, text[:500]
-            view.checked = read_code(text, self.stage.activity.secret())
+            self._look(errs="check", checked=None, typed=text[:500])
+            self._look(checked=read_code(text, self.stage.activity.secret()))
 
     def _change(self, name: str, rest: list[object], value: object) -> None:
         course = self._progress.course
@@ -217,7 +209,7 @@ class CourseFeature(Feature):
                 raise InputError("course", name, "a control of the editor")
         self._progress.edit(changed)
         self.stage.activity.enter_course()
-        self._view.link = ""
+        self._look(link="")
 
     def _set(self, course: Course, what: str, text: str) -> Course:
         """A typed text, or one more item."""
@@ -274,21 +266,10 @@ class CourseFeature(Feature):
         self.stage.activity.enter_course()
         if self.shown:
             self._progress.at = None
-        self._update()
+        self._begin()
 
     def on_activity(self) -> None:
-        update_html(self._bar, views.bar_html(self._progress, self.stage.activity.exercises))
-
-    def _update(self) -> None:
-        update_html(self._bar, views.bar_html(self._progress, self.stage.activity.exercises))
-        if self._page is None:
-            return
-        if self._progress.course is None:
-            update_html(self._page, views.chooser_html(self._courses, self._view, self._progress.seated))
-        else:
-            self._ask_back()
-            known, courses = self.stage.activity.exercises, self._courses.all
-            update_html(self._page, views.course_html(self._progress, known, courses, self._view))
+        self.schedule()
 
     def _ask_back(self) -> None:
         activity = self.stage.activity

@@ -29,7 +29,7 @@ LESSON_MARKS: dict[Mark, tuple[str, str, str]] = {
 }
 
 
-@dataclass
+@dataclass(frozen=True)
 class CourseView:
     """What a page shows of its course besides the course.
 

@@ -20,7 +20,7 @@ from app.exercises.kinds import KINDS
 from app.exercises.shelf import digest, written_in_a_page
 from app.viewer.activity.activity import AUTHOR, EXERCISES
 from app.viewer.declared.facts import Facts
-from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.feature import OpenableFeature
 from app.viewer.declared.fields import Settings, memory
 from app.viewer.declared.fields import text as text_field
 from app.viewer.declared.panel import Html
@@ -28,7 +28,7 @@ from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Node, axes, frame, label
 from app.viewer.exercises import author_views as views
 from app.viewer.exercises.drawing import SIZE
-from app.viewer.feature import Stage, save_file, sent_text
+from app.viewer.feature import save_file, sent_text
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 from kin.parsing import to_toml
@@ -106,8 +106,8 @@ def _trial(draft: str, find: Find) -> Trial:
     return tried(draft, FILE, find)
 
 
-class Author(DeclaredFeature[AuthorSettings, Drafted]):
-    """It lives as long as the page, so that the draft is kept while it is tried; `show` and `hide` it."""
+class Author(OpenableFeature[AuthorSettings, Drafted]):
+    """The draft is kept while it is tried."""
 
     key = AUTHOR
     title = "Write an exercise"
@@ -116,20 +116,6 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
     messages = frozenset(
         {"set", "add", "drop", "look", "pose", "try", "save", "serve", "bring", "close", "upload"}
     )
-
-    def __init__(self, stage: Stage) -> None:
-        self.shown = False
-        super().__init__(stage)
-
-    def show(self) -> None:
-        """Show the form."""
-        self.shown = True
-        self.refresh()
-
-    def hide(self) -> None:
-        """Hide form and drawings; the draft stays."""
-        self.shown = False
-        self.refresh()
 
     # Declared
 

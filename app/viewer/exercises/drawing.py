@@ -3,6 +3,8 @@ the arm that a wrong answer is about."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,60 +16,48 @@ from app.viewer.skeleton import ghost
 from kin import Robot, fk, wxyz_from_rotation
 from kin.transforms import Array
 
-GHOST = ("ghost",)  # the event of a drag of the ghost
+GHOST = ("on_ghost",)  # the event of a drag of the ghost
 SIZE = 0.14  # of a frame's axes, in reaches of the arm
 _COLOR = (213, 94, 0)
 OPACITY = 0.42  # of a copy of the arm
 
 
+def goal(key: str, T: Array, reach: float, words: str) -> Node:
+    """A frame at a pose ``(4, 4)`` with a label."""
+    size = SIZE * reach
+    return _frame(key, T, size, words, 0.5 * size)
+
+
+def own_frame(T: Array, reach: float) -> Node:
+    """The frame that the visitor drags, at a pose ``(4, 4)``."""
+    size = SIZE * reach
+    props = {"scale": 1.7 * size, "line_width": 3.0, "depth_test": False}
+    frame = _frame("frame", np.eye(4), 1.2 * size, "your ghost", 1.9 * size)
+    return Node("transform_controls", "ghost", props, *_place(T), (frame,), drag=GHOST)
+
+
+def mistaken_arm(robot: Robot, q: Array) -> Sequence[Node]:
+    """A copy of an arm at q ``(n,)``, for which a wrong answer is right."""
+    words = label("words", "the arm of your answer", fk(robot, q)[:3, 3], anchor=None)
+    return [replace(node, keep=False) for node in (ghost("arm", robot, q, _COLOR, OPACITY), words)]
+
+
 class Drawing:
-    """Draws into one visitor's scene; `post` gets ``("drag", GHOST, number)`` with a `DragEvent`."""
+    """The frame that the visitor drags, in a scene of its own; `post` gets ``("drag", GHOST, number)``."""
 
     def __init__(self, scene: viser.SceneApi, post: Post) -> None:
-        self._view, self._arm = SceneView(scene, "exercise", post), SceneView(scene, "exercise-arm", post)
-        self._nodes: list[Node] = []
+        self._view = SceneView(scene, "exercise", post)
+        self.has_ghost = False
 
     def clear(self) -> None:
-        """Remove everything."""
-        self.arm(None)
-        self._nodes = []
+        """Remove it."""
+        self.has_ghost = False
         self._view.remove()
 
-    @property
-    def has_ghost(self) -> bool:
-        """Whether there is a frame to drag."""
-        return any(node.drag for node in self._nodes)
-
-    def goal(self, T: Array, reach: float, words: str) -> None:
-        """A frame with a label."""
-        size = SIZE * reach
-        self._add(_frame(f"goal-{len(self._nodes)}", T, size, words, 0.5 * size))
-
     def ghost(self, T: Array, reach: float) -> None:
-        """A frame that the visitor drags."""
-        size = SIZE * reach
-        props = {"scale": 1.7 * size, "line_width": 3.0, "depth_test": False}
-        frame = _frame("frame", np.eye(4), 1.2 * size, "your ghost", 1.9 * size)
-        self._add(Node("transform_controls", "ghost", props, *_place(T), (frame,), drag=GHOST))
-
-    def arm(self, at: tuple[Robot, Array] | None) -> None:
-        """A copy of an arm at q ``(n,)``, for which a wrong answer is right; None removes it."""
-        if at is None:
-            self._arm.remove()
-            return
-        words = label("words", "the arm of your answer", fk(*at)[:3, 3], anchor=None)
-        self._arm.show((ghost("arm", *at, _COLOR, OPACITY), words))
-
-    def place(self, T: Array) -> None:
-        """Move the ghost."""
-        for node in self._nodes:
-            if node.drag:
-                node.position, node.wxyz = _place(T)
-        self._view.show(self._nodes)
-
-    def _add(self, node: Node) -> None:
-        self._nodes.append(node)
-        self._view.show(self._nodes)
+        """Show it at a pose ``(4, 4)``."""
+        self.has_ghost = True
+        self._view.show([own_frame(T, reach)])
 
 
 def _frame(key: str, T: Array, size: float, words: str, above: float) -> Node:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable
-from dataclasses import replace
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import viser
@@ -12,126 +12,170 @@ import viser
 import kin
 from app.exercises import Asked, Exercise, Variant, VariantError, Verdict
 from app.viewer.activity.activity import EXERCISES
-from app.viewer.activity.practice import Practice, Record
-from app.viewer.exercises import views
-from app.viewer.exercises.drawing import SIZE, Drawing
+from app.viewer.activity.practice import Practice
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import OpenableFeature
+from app.viewer.declared.fields import Settings, memory
+from app.viewer.declared.panel import Html, Native
+from app.viewer.declared.panel import Node as PanelNode
+from app.viewer.declared.scene import Node
+from app.viewer.exercises import drawing, views
+from app.viewer.exercises.drawing import SIZE
 from app.viewer.exercises.sheet import Sheet
-from app.viewer.feature import Feature, Stage
-from app.viewer.panel import update_html
-from app.viewer.panel.part import Block, add_html
+from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from app.viewer.scene.gizmo import DragEvent
-from kin import InputError
+from kin import InputError, Robot
 from kin.transforms import Array, pose_from_position_wxyz
 from kin.typed import EntryError
 
 LONGEST_SENDING = 40  # characters
 
 
-class Practising(Feature):
-    """A list by topic, or one exercise.
+@dataclass(frozen=True)
+class PractisingSettings(Settings):
+    """The exercise on show, as far as it is in this page alone.
 
-    It lives as long as the page; `show` and `hide` build and remove its HTML.
+    Attributes:
+        variant: its numbers; None: there are none.
+        seed: of these.
+        sheet: what was entered.
+        mistaken: the arm that a wrong answer is about, while the robot on show stays.
+        closed: whether its answer was on show already.
+        since: when it was opened or answered (`time.perf_counter`).
+        news: of other pages of the seat, as far as they are known here.
     """
+
+    variant: Variant | None = memory(renew=False)
+    seed: int = memory(0, renew=False)
+    sheet: Sheet = memory(renew=False)
+    mistaken: tuple[Robot, Array] | None = memory()
+    closed: bool = memory(False, renew=False)
+    since: float = memory(0.0, renew=False)
+    news: int = memory(0, renew=False)
+
+
+class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]]):
+    """A list by topic, or one exercise."""
 
     key = EXERCISES
     title = "Exercises"
     about = "Questions with your own numbers, hints and reasons."
     door = views.DOOR
+    settings_of, facts_of = PractisingSettings, Facts
     messages = frozenset(
         {"open", "list", "answer", "fields", "posture", "place", "pick", "hint", "reveal", "again", "scene"}
     )
 
     def __init__(self, stage: Stage, practice: Practice | None = None) -> None:
-        super().__init__(stage)
         self._practice = stage.activity.practice if practice is None else practice
-        self._sheet = Sheet()
-        self._variant: Variant | None = None
-        self._seed = 0  # of the numbers on show
-        self._note = ""  # on show
-        self._news = 0  # known
-        self._shown = Record()  # of the exercise, as it is on show
-        self._since = 0.0
-        self._box: viser.GuiFolderHandle | None = None
-        self._blocks: list[Block] = []
-        self._container: viser.GuiFolderHandle
-        self._joints: viser.GuiFolderHandle | None = None
-        self._drawing = Drawing(stage.client.scene, self.post)
+        super().__init__(stage)
 
     def show(self) -> None:
-        """Build the HTML in the container that is open."""
-        gui = self.stage.client.gui
-        self._box = gui.add_folder(None)
-        with self._box:
-            self._blocks = [add_html(gui), add_html(gui)]
-            with gui.add_folder(None) as self._container:
-                pass
-            self._blocks.append(add_html(gui))
+        """Show the list, or the open exercise."""
+        self.shown = True
         if self._practice.at is not None:
-            self._begin(self._practice.at)
-        self._update()
+            self._enter(self._practice.at)
+        self.refresh()
 
     def hide(self) -> None:
-        """Remove HTML and drawings; what was done is kept."""
-        if self._box is None:
-            return
-        self._undraw()
-        self._show_joints(False)
-        self._box.remove()
-        self._box, self._blocks = None, []
-
-    @property
-    def shown(self) -> bool:
-        """Whether the HTML is built."""
-        return self._box is not None
+        """Hide all; what was done is kept."""
+        if self.shown:
+            self._leave_view()
+            super().hide()
 
     def open(self, exercise_id: object) -> None:
         """Show an exercise, and no other one on the way; raises `kin.InputError` for one that does not exist."""
         self._practice.open(exercise_id)
-        if not self.shown:
+        if self.shown:
+            self._enter(self._now)
+            self.stage.activity.changed()
+        else:
             self.stage.open_choice(self.title)
-            return
-        self._begin(self._now)
-        self._update()
+
+    # Declared
+
+    def panel(self) -> Sequence[PanelNode]:
+        if not self.shown:
+            return ()
+        exercise, variant, practice = self._practice.at, self.settings.variant, self._practice
+        if exercise is None or variant is None:
+            return [Html(str, (self._list(),))]
+        activity, units, sheet = self.stage.activity, self.stage.units, self.settings.sheet
+        record, door, asked = practice.record(exercise), self.door, self._asked
+        at_home, own = self.stage.now.robot == exercise.robot, activity.exercises.is_own(exercise.id)
+        led = activity.leads("exercise", exercise.id)
+        above = replace(door, back="") if led else door
+        head = exercise, variant, units, at_home, record.variant, own and not practice.seated, above
+        of = f"{exercise.id} {record.variant}"
+        following = self._following(exercise)
+        foot = views.foot_html(exercise, variant, units, sheet, activity, record, following, door)
+        asks_arm = asked.form == "posture" and not record.closed
+        return [
+            Html(str, (views.task_html(*head),)),
+            Html(str, (views.question_html(asked, sheet, record.closed, door, of),)),
+            *([Native(self._joints)] if asks_arm else []),
+            Html(str, (foot,)),
+        ]
+
+    def scene(self) -> Sequence[Node]:
+        exercise, s = self._practice.at, self.settings
+        if not self.shown or exercise is None or s.variant is None:
+            return ()
+        reach = exercise.robot.reach
+        nodes = [drawing.goal(f"goal-{i}", T, reach, words) for i, (words, T) in enumerate(self._frames)]
+        if self._asked.form == "frame" and not self._practice.record(exercise).closed:
+            nodes.append(drawing.own_frame(s.sheet.ghost, reach))
+        return [*nodes, *(() if s.mistaken is None else drawing.mistaken_arm(*s.mistaken))]
+
+    def _joints(self, order: float) -> _Joints:
+        return _Joints(self.stage, order)
 
     # Events
 
     def handle(self, key: Hashable, value: object) -> None:
+        super().handle(key, value)
+        if self.shown:
+            self.stage.activity.changed()
+
+    def heard(self, key: Hashable, value: object) -> None:
         if not self.shown:
             match key:
                 case ("open", str(exercise_id), int()):  # from elsewhere
                     self.open(exercise_id)
             return  # others are late clicks on what has been removed
         match key:
-            case ("drag", _, int()) if isinstance(value, DragEvent):
-                self._sheet.drag(pose_from_position_wxyz(value.position, value.wxyz), self.stage.units)
             case ("list", int()):
                 self._practice.close()
-                self._undraw()
+                self._leave_view()
             case ("open", str(exercise_id), int()):
                 self.open(exercise_id)
             case _ if self._practice.at is not None:
                 self._act(key, value)
-        self._update()
+
+    def on_ghost(self, event: DragEvent) -> None:
+        """The visitor has dragged the ghost."""
+        if self.shown:
+            self.settings.sheet.drag(pose_from_position_wxyz(event.position, event.wxyz), self.stage.units)
 
     def _act(self, key: Hashable, value: object) -> None:
         """An event of the exercise on show."""
-        exercise, record = self._now, self._practice.record(self._now)
+        exercise, record, s = self._now, self._practice.record(self._now), self.settings
         match key:
             case ("hint", int()):
                 record.hints = min(record.hints + 1, len(exercise.hints))
             case ("reveal", int()):
-                if not record.closed and self._give_up(exercise, time.perf_counter() - self._since):
-                    self._sheet.verdict, self._sheet.error = None, ""
+                if not record.closed and self._give_up(exercise, time.perf_counter() - s.since):
+                    s.sheet.verdict, s.sheet.error = None, ""
                     self._show_answer()
             case ("again", int()):
                 self._practice.again(exercise)
-                self._begin(exercise)
+                self._enter(exercise)
             case ("scene", int()):
                 self._set_scene(exercise)
             case ("pick", int()) if not record.closed:
-                self._sheet.pick(value, len(self._asked.labels))
+                s.sheet.pick(value, len(self._asked.labels))
             case ("answer" | "fields" | "posture" | "place", int()) if not record.closed:
                 self._answer(str(key[0]), value)
             case ("answer" | "fields" | "posture" | "place", str(sending), int()) if not record.closed:
@@ -145,28 +189,17 @@ class Practising(Feature):
         names = {"open": "Exercise", "list": "List of exercises", "hint": "Hint", "again": "New numbers"}
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Answer"
 
-    def on_robot(self) -> None:
-        self._drawing.arm(None)  # of an arm that is not on show
-        self._update()
-
-    def on_style(self) -> None:
-        self._update()
-
     def on_activity(self) -> None:
-        exercise = self._practice.at
-        if not self.shown or exercise is None:
-            return
-        if self._practice.seed_of(exercise) != self._seed:  # another place was entered
-            self._begin(exercise, move=False)
-            self._update()
-        elif self.stage.activity.news != self._news:
-            self._news = self.stage.activity.news
-            if self._practice.record(exercise).closed and not self._shown.closed:
-                self._sheet.verdict, self._sheet.error = None, ""
-                self._show_answer()
-            self._update()
-        elif self.stage.activity.note != self._note:
-            self._update()
+        exercise, s, activity = self._practice.at, self.settings, self.stage.activity
+        if self.shown and exercise is not None:
+            if self._practice.seed_of(exercise) != s.seed:  # another place was entered
+                self._enter(exercise, move=False)
+            elif activity.news != s.news:
+                self.change(news=activity.news)
+                if self._practice.record(exercise).closed and not s.closed:
+                    s.sheet.verdict, s.sheet.error = None, ""
+                    self._show_answer()
+        self.schedule()
 
     def state(self) -> dict[str, object]:
         return self._practice.state()
@@ -176,13 +209,11 @@ class Practising(Feature):
         if not self.shown:
             return
         if self._practice.at is None:
-            self._undraw()
+            self._leave_view()
         else:
-            self._begin(self._practice.at, move=False)
-        self._update()
-
-    def remove(self) -> None:
-        self.hide()
+            self._enter(self._practice.at, move=False)
+        self._begin()
+        self.stage.activity.changed()
 
     # The exercise on show
 
@@ -192,90 +223,88 @@ class Practising(Feature):
             raise InputError("exercise", None, "an open exercise")
         return self._practice.at
 
-    def _begin(self, exercise: Exercise, move: bool = True) -> None:
+    def _enter(self, exercise: Exercise, move: bool = True) -> None:
         """Draw the numbers, and set the scene for an exercise."""
-        self._sheet, self._since = Sheet(), time.perf_counter()
-        self._seed, self.stage.activity.note = self._practice.seed_of(exercise), ""
+        self.change(sheet=Sheet(), since=time.perf_counter(), seed=self._practice.seed_of(exercise), mistaken=None)
+        self.stage.activity.note = ""
         try:
-            self._variant = self._practice.variant(exercise)
+            self.change(variant=self._practice.variant(exercise))
         except VariantError as error:  # of an operator's file that was not checked
             self._practice.close()
-            self._variant = None
+            self.change(variant=None)
             self.stage.notify(Notice("error", f"{exercise.title} cannot be used", str(error)))
             return
         if move:
             self._set_scene(exercise)
         else:
-            self._draw(exercise)
+            self._fit_view(exercise)
 
     def _set_scene(self, exercise: Exercise) -> None:
-        stage, variant = self.stage, self._variant
+        stage, variant = self.stage, self.settings.variant
         assert variant is not None
         if stage.now.robot != exercise.robot:
             stage.change_robot(exercise.robot)
         shows = exercise.kind.shows_posture or self._practice.record(exercise).closed
         q = variant.q if shows else exercise.robot.q_home
         stage.move_to(q, Notice("hand", exercise.title, "The arm is ready for the exercise."))
-        self._draw(exercise)
+        self._fit_view(exercise)
 
-    def _draw(self, exercise: Exercise) -> None:
-        """The frames of the exercise."""
-        self._drawing.clear()
-        variant, asked = self._variant, self._asked
+    @property
+    def _frames(self) -> list[tuple[str, Array]]:
+        """The poses that are drawn, with their names."""
+        variant, asked, exercise = self.settings.variant, self._asked, self._now
         assert variant is not None
-        reach, shown = exercise.robot.reach, []
         goal = asked.goal if asked.goal is not None else variant.target
-        closed = self._practice.record(exercise).closed
-        if goal is not None:
-            shown.append(goal)
-            self._drawing.goal(goal, reach, "target")
-        if asked.form == "frame":
-            if closed:
-                shown.append(right := _pose(exercise.kind.answer(variant)))
-                self._drawing.goal(right, reach, "right place")
-            else:
-                self._drawing.ghost(self._sheet.ghost, reach)
-        room = [(T[:3, 3], SIZE * reach) for T in shown]
+        found = [] if goal is None else [("target", goal)]
+        if asked.form == "frame" and self._practice.record(exercise).closed:
+            found.append(("right place", _pose(exercise.kind.answer(variant))))
+        return found
+
+    def _fit_view(self, exercise: Exercise) -> None:
+        """What is drawn and where the arm is or was is in the picture."""
+        closed, variant = self._practice.record(exercise).closed, self.settings.variant
+        assert variant is not None
+        self.change(closed=closed)
+        room = [(T[:3, 3], SIZE * exercise.robot.reach) for _, T in self._frames]
         if exercise.q and (closed or exercise.kind.shows_posture):
             room.append(round_points(kin.link_frames(exercise.robot, variant.q)[:, :3, 3]))
         self.stage.fit_view(room)
+        self.schedule()
 
-    def _undraw(self) -> None:
-        self._drawing.clear()
+    def _leave_view(self) -> None:
         self.stage.fit_view(())
         self.stage.keep_in_view()
 
     @property
     def _asked(self) -> Asked:
-        assert self._variant is not None
-        return self._now.asked(self._variant, self.stage.units)
+        assert self.settings.variant is not None
+        return self._now.asked(self.settings.variant, self.stage.units)
 
     def _answer(self, how: str, value: object, sending: str = "") -> None:
         """Judge an answer; `sending` as in `Judged`."""
-        exercise, variant, sheet, form = self._now, self._variant, self._sheet, self._asked.form
+        exercise, variant, sheet, form = self._now, self.settings.variant, self.settings.sheet, self._asked.form
         assert variant is not None
         sheet.error, sheet.verdict = "", None
         if how == "fields":
             sheet.fill(value)
+        self.change(mistaken=None)
         try:
             given = (
                 self.stage.now.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
             )
-            if form == "frame":
-                self._drawing.place(sheet.ghost)
             verdict = exercise.judge(variant, given, self.stage.units)
         except EntryError as error:
-            self._drawing.arm(None)
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)
             return
         except InputError as error:
-            self._drawing.arm(None)
             sheet.error = f"{str(error)[:1].upper()}{str(error)[1:]}."
             return
         sheet.verdict = verdict
-        shown, mistaken = self.stage.now.robot == exercise.robot, verdict.mistaken
-        self._drawing.arm(mistaken.arm_unlike(variant) if shown and mistaken is not None else None)
-        seconds, self._since = time.perf_counter() - self._since, time.perf_counter()
+        if verdict.mistaken is not None and self.stage.now.robot == exercise.robot:
+            self.change(mistaken=verdict.mistaken.arm_unlike(variant))
+        now = time.perf_counter()
+        seconds = now - self.settings.since
+        self.change(since=now)
         self._take(exercise, given, verdict, seconds, sending)
         if verdict.right:
             self._show_answer()
@@ -301,68 +330,28 @@ class Practising(Feature):
 
     def _show_answer(self) -> None:
         """Let the scene show it."""
-        exercise, variant = self._now, self._variant
+        exercise, variant = self._now, self.settings.variant
         assert variant is not None
         notice = Notice("hand", exercise.title, "The arm shows the answer.")
         if self._asked.form == "posture" and self._practice.record(exercise).mark == "shown":
             self.stage.move_to(np.array(exercise.kind.answer(variant)), notice)
         elif exercise.q and not exercise.kind.shows_posture and self.stage.now.robot == exercise.robot:
             self.stage.move_to(variant.q, notice)
-        self._draw(exercise)
+        self._fit_view(exercise)
 
-    def _show_joints(self, on: bool) -> None:
-        """The joint sliders, where the arm is the answer."""
-        if on == (self._joints is not None):
-            return
-        if self._joints is not None:
-            self.stage.show_joints(None)
-            self._joints.remove()
-            self._joints = None
-            return
-        with self._container:
-            self._joints = self.stage.client.gui.add_folder("Joints of the arm")
-        self.stage.show_joints(self._joints)
 
-    def _update(self) -> None:
-        if not self.shown:
-            return
-        exercise, practice, units = self._practice.at, self._practice, self.stage.units
-        activity, self._note = self.stage.activity, self.stage.activity.note
-        if exercise is None or self._variant is None:
-            contents = [self._list(), "", ""]
-        else:
-            self._shown = replace(practice.record(exercise))
-            variant, closed = self._variant, self._shown.closed
-            led = activity.leads("exercise", exercise.id)
-            contents = [
-                views.task_html(
-                    exercise,
-                    variant,
-                    units,
-                    self.stage.now.robot == exercise.robot,
-                    self._shown.variant,
-                    activity.exercises.is_own(exercise.id) and not practice.seated,
-                    replace(self.door, back="") if led else self.door,
-                ),
-                views.question_html(
-                    self._asked, self._sheet, closed, self.door, f"{exercise.id} {self._shown.variant}"
-                ),
-                views.foot_html(
-                    exercise,
-                    variant,
-                    units,
-                    self._sheet,
-                    activity,
-                    self._shown,
-                    self._following(exercise),
-                    self.door,
-                ),
-            ]
-        posture = exercise is not None and self._asked.form == "posture"
-        self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
-        for block, content in zip(self._blocks, contents, strict=True):
-            update_html(block, content)
-        activity.changed()
+class _Joints:
+    """The joint sliders once more, where the arm is the answer."""
+
+    def __init__(self, stage: Stage, order: float) -> None:
+        self._stage = stage
+        self._folder: viser.GuiFolderHandle = stage.client.gui.add_folder("Joints of the arm", order=order)
+        stage.show_joints(self._folder)
+
+    def remove(self) -> None:
+        """Remove them."""
+        self._stage.show_joints(None)
+        self._folder.remove()
 
 
 def _pose(numbers: object) -> Array:

@@ -7,19 +7,20 @@ room stay as they are. The question of a lesson opens in its lesson, on another 
 from __future__ import annotations
 
 import random
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 
 from app.exercises import Exercise, Verdict
 from app.viewer.activity.activity import REVIEW
 from app.viewer.activity.practice import MOST
 from app.viewer.activity.review import Missed
-from app.viewer.exercises.feature import Practising
+from app.viewer.declared.fields import memory
+from app.viewer.declared.panel import Html, Node
+from app.viewer.exercises.feature import Practising, PractisingSettings
 from app.viewer.exercises.views import Door, Following
 from app.viewer.feature import Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
-from app.viewer.panel import update_html
-from app.viewer.panel.part import add_html
 from app.viewer.review import views
 from app.viewer.review.arms import other_arm
 from kin import InputError, UnknownRobotError
@@ -27,40 +28,57 @@ from kin import InputError, UnknownRobotError
 _DRAWS = 20  # seeds until the numbers are others
 
 
+@dataclass(frozen=True)
+class ReviewSettings(PractisingSettings):
+    """The exercise that is asked again, and the lesson.
+
+    Attributes:
+        asked_in: the key of the lesson that was opened last, until it is left.
+        arrived: whether it is open by now.
+    """
+
+    asked_in: str = memory("", renew=False)
+    arrived: bool = memory(False, renew=False)
+
+
 class Reviewing(Practising):
     """The list of what is due, or one exercise of it.
 
-    Its row stands above the list of lessons, and its bar above a lesson that it has opened; both live as long as
-    the page. `show` and `hide` build and remove the rest.
+    Its row stands above the list of lessons, and its bar above a lesson that it has opened.
     """
+
+    settings: ReviewSettings
 
     key = REVIEW
     title = "Review"
     about = "What you have missed, again with other numbers."
     door = Door(REVIEW, "Review", counts=False)
+    settings_of = ReviewSettings
     messages = Practising.messages | {"next", "back"}
 
     def __init__(self, stage: Stage) -> None:
-        super().__init__(stage, stage.activity.asked_again)
         self._review = stage.activity.review
-        self._asked_in = ""  # the key of the lesson that was opened last, until it is left
-        self._arrived = False  # whether it is open by now
-        self._bar = add_html(stage.client.gui)
-        self._row = add_html(stage.client.gui)
-        self._show_row()
+        super().__init__(stage, stage.activity.asked_again)
+
+    def panel(self) -> Sequence[Node]:
+        activity, s = self.stage.activity, self.settings
+        counts = views.Counts.of(self._review, activity.courses.exercises)
+        bar = views.bar_html(counts) if s.asked_in and activity.lesson == s.asked_in else ""
+        row = views.row_html(self.title, counts, activity.practice.seated) if activity.lesson is None else ""
+        return [Html(str, (bar,), key="bar"), Html(str, (row,), key="row"), *super().panel()]
 
     # Events
 
-    def handle(self, key: Hashable, value: object) -> None:
+    def heard(self, key: Hashable, value: object) -> None:
         match key:
             case ("next", int()):
-                if (following := self._due) is not None:
+                if (following := self._asked_next) is not None:
                     self.open(following.key)
             case ("back", int()):
                 self._practice.close()
                 self.stage.post("lesson", self.title)
             case _:
-                super().handle(key, value)
+                super().heard(key, value)
 
     def open(self, exercise_id: object) -> None:
         """Ask something again: an exercise by its id, a question of a lesson by its key in the list."""
@@ -95,7 +113,7 @@ class Reviewing(Practising):
             robot = stage.store.robots[0]
         robot = other_arm(lesson, missed.question, robot, stage.store.robots, random.Random())
         self._review.move(missed.key, robot.id)
-        self._asked_in, self._arrived = lesson.key, False
+        self.change(asked_in=lesson.key, arrived=False)
         stage.activity.question_again = missed.key
         stage.activity.leave_item()
         if stage.now.robot != robot:
@@ -122,7 +140,7 @@ class Reviewing(Practising):
         self.stage.activity.progress.look_back(exercise.id, mark)
 
     def _following(self, exercise: Exercise) -> Following | None:
-        due = self._due
+        due = self._asked_next
         return None if due is None else Following("Next", "open", due.key)
 
     def _list(self) -> str:
@@ -130,7 +148,7 @@ class Reviewing(Practising):
         return views.list_html(self._review, activity.courses.exercises, activity.practice.seated)
 
     @property
-    def _due(self) -> Missed | None:
+    def _asked_next(self) -> Missed | None:
         """What is asked next."""
         return next(iter(views.known(self._review.due, self.stage.activity.courses.exercises)), None)
 
@@ -140,19 +158,14 @@ class Reviewing(Practising):
         return "Review" if isinstance(key, tuple) and key[0] == "next" else super().step_name(key)
 
     def on_activity(self) -> None:
-        self._show_row()
+        s, activity = self.settings, self.stage.activity
+        here = s.asked_in != "" and activity.lesson == s.asked_in
+        if s.arrived and not here:  # it was left
+            activity.question_again = ""
+            self.change(asked_in="")
+        if here != s.arrived:
+            self.change(arrived=here)
         super().on_activity()
-
-    def _show_row(self) -> None:
-        activity = self.stage.activity
-        counts = views.Counts.of(self._review, activity.courses.exercises)
-        here = self._asked_in != "" and activity.lesson == self._asked_in
-        if self._arrived and not here:
-            self._asked_in = activity.question_again = ""
-        self._arrived = here
-        row = views.row_html(self.title, counts, activity.practice.seated) if activity.lesson is None else ""
-        update_html(self._row, row)
-        update_html(self._bar, views.bar_html(counts) if here else "")
 
     def state(self) -> dict[str, object]:
         missed = self._review.state()
@@ -161,4 +174,4 @@ class Reviewing(Practising):
     def restore(self, state: dict[str, object]) -> None:
         self._review.restore(state.get("missed"))
         super().restore(state)
-        self._show_row()
+        self._begin()

@@ -55,10 +55,11 @@ class LessonChoice:
         self._parent = parent
         self._stage = stage
         self._titles = (NONE, *(each.title for each in choices()))
-        self.exercises = Practising(stage)
         with parent:
-            self.courses = CourseFeature(stage)
+            bar = add_html(gui)
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
+            self.exercises = Practising(stage)
+            self.courses = CourseFeature(stage, bar)
             self.author = Author(stage)
             self.reviewing = Reviewing(stage)
             self._overview: Block | None = add_html(gui, _overview())

@@ -6,21 +6,23 @@ the panel, so the service keeps nothing, and it works for an arm of the visitor'
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
-
-import viser
+from collections.abc import Callable, Hashable, Iterable, Sequence
 
 from app.exports.snippets import named
 from app.exports.worksheet import Part, Question, Sheet, csv_text, draw, latex
-from app.viewer.feature import Feature, Stage
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import Settings
+from app.viewer.declared.panel import Folder, Html, Node
+from app.viewer.feature import Stage
 from app.viewer.lessons.guide import outline as guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import update_html
-from app.viewer.panel.part import Block, add_html
+from app.viewer.panel.part import Block
 from app.viewer.panel.status import Notice
 from app.viewer.takehome.sending import send_page
 from app.viewer.views.templates import render
-from app.viewer.worksheet.views import page_html
+from app.viewer.worksheet.views import buttons, page_html
 from kin import InputError
 
 FILES: dict[str, tuple[str, Callable[[Sheet], str]]] = {
@@ -30,7 +32,7 @@ FILES: dict[str, tuple[str, Callable[[Sheet], str]]] = {
 }
 
 
-class Worksheets(Feature):
+class Worksheets(DeclaredFeature[Settings, Facts[Settings]]):
     """The buttons below a lesson. Also pressed in the tab *View*.
 
     Args:
@@ -42,26 +44,26 @@ class Worksheets(Feature):
     key = "sheet"
     title = "Worksheet"
     acts = False
+    settings_of, facts_of = Settings, Facts
     messages = frozenset({"page", "web", *FILES})
 
     def __init__(self, stage: Stage, lesson: Lesson | None, page: Block, folder: bool = True) -> None:
+        self._lesson, self._page, self._folder = lesson, page, folder
         super().__init__(stage)
-        self._lesson = lesson
-        self._page = page
-        self._folder: viser.GuiFolderHandle | None = None
-        if folder:
-            self._folder = stage.client.gui.add_folder("Worksheet", expand_by_default=lesson is not None)
-            with self._folder:
-                add_html(stage.client.gui, render("sheet/buttons", lesson=lesson is not None))
 
-    def handle(self, key: Hashable, value: object) -> None:
+    def panel(self) -> Sequence[Node]:
+        with_lesson = self._lesson is not None
+        shown = [Folder("Worksheet", [Html(buttons, (with_lesson,))], open=with_lesson)]
+        return shown if self._folder else ()
+
+    def heard(self, key: Hashable, value: object) -> None:
         match key:
             case ("page", int(serial)):
-                page = render("sheet/withheld") if self._withheld else page_html(self.sheet())
+                page = render("sheet/withheld") if self.hides("table") else page_html(self.sheet())
                 update_html(self._page, render("sheet/handed", page=page, serial=serial))
             case ("web", int()):
                 send_page(self.stage)
-            case (str(name), int()) if name in FILES and self._withheld:
+            case (str(name), int()) if name in FILES and self.hides("table"):
                 words = "The worksheet would contain the table that the open exercise asks for."
                 self.stage.notify(Notice("advice", "Not now", words))
             case (str(name), int()) if name in FILES:
@@ -77,10 +79,6 @@ class Worksheets(Feature):
         return [
             (f"Save the worksheet as {suffix.upper()}", (kind, 0), None) for kind, (suffix, _) in FILES.items()
         ]
-
-    @property
-    def _withheld(self) -> bool:
-        return "table" in self.stage.activity.withheld
 
     def sheet(self) -> Sheet:
         """The worksheet for the arm as it is."""
@@ -100,9 +98,8 @@ class Worksheets(Feature):
         )
 
     def remove(self) -> None:
+        super().remove()
         update_html(self._page, "")
-        if self._folder is not None:
-            self._folder.remove()
 
 
 def parts_of(outline: guide.Outline) -> tuple[Part, ...]:

@@ -11,6 +11,11 @@ from app.viewer.views.templates import render
 EMPTY = [[""] * 4] * 4
 
 
+def buttons(lesson: bool) -> str:
+    """What can be done with the sheet; whether it is that of a `lesson`, or of the arm alone."""
+    return render("sheet/buttons", lesson=lesson)
+
+
 def page_html(sheet: Sheet) -> str:
     """Questions on the first pages; the solutions, if there are any, on pages of their own."""
     given = [(f"A{str(i).translate(SUBSCRIPTS)}", sheet.entries(A)) for i, A in enumerate(sheet.matrices, 1)]

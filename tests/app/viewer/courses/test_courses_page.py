@@ -324,7 +324,7 @@ def test_a_teacher_pairs_exercises_before_and_after(server: int) -> None:
         assert block(tab, "edit").count("data-course-row") == 3
         press(tab, "course", ["set", "before-1", 8], "no-such")
         tab.wait(lambda: "before[0]: got 'no-such'" in shown(tab))
-        press(tab, "course", ["done", 9])
+        press(tab, "course", ["finish", 9])
         tab.wait(lambda: "0 of 3 done" in block(tab, "follow"))
         kept = decode(tab.stored(), [get_robot("puma560")]).features["course"]["course"]
         assert (kept["before"], kept["after"]) == (["two-elbows"], ["other-wrist"])
@@ -346,7 +346,7 @@ def test_a_teacher_makes_a_course(server: int) -> None:
         press(tab, "course", ["answers", 10])
         press(tab, "course", ["set", "add", 11], "exercise:no-such")
         tab.wait(lambda: "exercise: got 'no-such'" in shown(tab))
-        press(tab, "course", ["done", 12])
+        press(tab, "course", ["finish", 12])
         tab.wait(lambda: "0 of 2 done" in block(tab, "follow"))
         assert "Answers are shown when you have found them" in block(tab, "follow")
         press(tab, "course", ["link", 13])
