@@ -327,7 +327,6 @@ IMPORTANT = 93  # in style sheets: most override what viser or Mantine writes in
 FIELDS = {
     "Capability": 1,
     "Guide": 7,
-    "Member": 6,
     "Workspace": 2,
 }
 FEATURE = re.compile(r"(Feature|Lesson)\b")

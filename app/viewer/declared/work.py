@@ -210,5 +210,7 @@ class Runner:
         job.task = None
 
     def _set(self, key: str, result: Result | None) -> None:
+        if result is None and key not in self.results:
+            return
         others = {name: one for name, one in self.results.items() if name != key}
         self.results = others if result is None else {**others, key: result}

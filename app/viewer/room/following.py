@@ -6,6 +6,7 @@ which costs this page as much as a drag of its own without the solving. The rest
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -55,7 +56,9 @@ class Follower:
         compute: whether lessons and other features are shown too, which may compute.
 
     Attributes:
+        began: when the present leader began to lead (`time.perf_counter`).
         moving: whether the target has moved since it was last solved here.
+        moved_at: when it did last.
         turned: whether the visitor has moved the camera since; then the other's viewpoint is not shown.
     """
 
@@ -68,10 +71,12 @@ class Follower:
         self._obstacles: tuple[Obstacle, ...] | None = None  # those of who was followed last
         self._own_obstacles: tuple[Obstacle, ...] = ()
         self.moving = self.turned = False
+        self.began = self.moved_at = 0.0
 
     def begin(self) -> None:
         """The next state is shown whole, with its viewpoint."""
         self._text, self._shown, self.moving, self.turned = "", None, False, False
+        self.began = time.perf_counter()
 
     def settle(self) -> None:
         """The other arm rests: solve its target here too, so that this page's words and numbers are about it."""
@@ -96,7 +101,7 @@ class Follower:
             self._page.adopt(replace(state, own=self._own(state)))
         elif not np.array_equal(state.q, self._page.now.goal) or not _equal(state.target, last.target):
             self._page.arm.follow(state.q, state.target)
-            self.moving = True
+            self.moving, self.moved_at = True, time.perf_counter()
         if state.target is None and (last is None or last.target is not None):
             self._page.status.show(READY)  # what it said was about another target
         if self._compute:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Hashable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import cast
 
 from app.classroom.views import ClassroomUnavailable, RefusedError, RoomView
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import Settings, memory
+from app.viewer.declared.work import Work
 from app.viewer.feature import Feature, Stage
 from app.viewer.live.feature import Connect
 from app.viewer.panel import update_html
@@ -21,7 +26,6 @@ from app.viewer.session.events import RULES, name_of
 from app.viewer.session.state import PageState
 
 NEWS: Hashable = "room"
-REFRESH = 0.2  # s between two updates of the tab and of the wall
 IDLE = 60.0  # s
 AGAIN = 6.0  # s within which a button that needs two presses must be pressed again
 SURE = 0.5  # s from the first press to the second; earlier ones are of a double click
@@ -54,34 +58,51 @@ def act_of(key: Hashable, value: object, features: Iterable[Feature | type[Featu
     return name
 
 
-class Member(Feature):
+@dataclass(frozen=True)
+class MemberSettings(Settings):
+    """What a page shows of its room.
+
+    Attributes:
+        bar: over the scene, outside of all tabs; nothing is shown before it is there.
+        room: as far as the tab shows it.
+        leader: who leads this page: "teacher", or the id of a seat.
+        armed: a button that needs two presses and when it was pressed for the first time.
+    """
+
+    bar: Block | None = memory(renew=False)
+    room: RoomView | None = memory(renew=False)
+    leader: str = memory("", renew=False)
+    armed: tuple[Hashable, float] | None = memory(renew=False)
+
+
+class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
     """The tab *Class* of one page. Subclasses: teacher and student."""
 
     key = "class"
     title = "Class"
     acts = False
+    settings_of, facts_of = MemberSettings, Facts
+    pace = 0.2
 
     def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
         self.page = cast(MemberPage, stage)
         assert self.page.attendance is not None  # taken before the page is built
         self.attendance = self.page.attendance
         self.room: RoomView = self.attendance.room
         self.follower = Follower(self.page, self.page.may_compute)
-        self.leader = ""  # who leads this page: "teacher", or the id of a seat
-        self.due = 0.0
-        self._began = 0.0
-        self._dirty = True
-        self._settles: float | None = None  # when the arm of who leads has rested long enough
-        self._next = 0.0
         self._sharing = Sharing(self.shared_state, self.attendance.tell_page, lambda: self.share_every)
-        self._armed: tuple[Hashable, float] = "", 0.0
-        self._bar: Block | None = None
+        super().__init__(stage)
 
     def attach(self, bar: Block) -> None:
         """Use this element, outside of all tabs, for the bar over the scene."""
-        self._bar = bar
+        self.change(bar=bar)
         self.apply_updates()
+        self.schedule()
+
+    @property
+    def leader(self) -> str:
+        """Who leads this page: "teacher", or the id of a seat."""
+        return self.settings.leader
 
     # To be overridden
 
@@ -90,8 +111,8 @@ class Member(Feature):
         """The room has changed: do at once what concerns the arm."""
 
     @abstractmethod
-    def refresh(self) -> None:
-        """Show the room in the tab."""
+    def refreshed(self) -> None:
+        """Tab and bar show the room as it is now."""
 
     @abstractmethod
     def bar(self) -> str:
@@ -131,11 +152,25 @@ class Member(Feature):
 
     # Feature
 
+    def running(self) -> Sequence[Work]:
+        armed, moving = self.settings.armed, self.follower.moving
+        works = [] if armed is None else [Work("disarm", tuple, (armed,), rest=AGAIN)]
+        return [*works, Work("settle", float, (self.follower.moved_at,), rest=SETTLED)] if moving else works
+
+    def worked(self, key: str) -> None:
+        if key == "disarm":
+            self.change(armed=None)
+        else:
+            self.follower.settle()
+
     def handle(self, key: Hashable, value: object) -> None:
         if key == NEWS:
             self._take_room()
+            self.due = 0.0  # the tab follows at its pace
         else:
-            self._dirty = True
+            super().handle(key, value)
+
+    def heard(self, key: Hashable, value: object) -> None:
         match key:
             case (str(kind), int()):
                 self._press(kind, "", value)
@@ -145,50 +180,36 @@ class Member(Feature):
                 self._press(kind, name, value)
             case ("look", str(seat)):
                 self._press("look", seat, None)
-        self.due = 0.0
 
     def _take_room(self) -> None:
-        before, leader = self.room, self.leader
         self.room = self.attendance.room
-        if self._bar is not None:
+        if self.settings.bar is not None:
             self.apply_updates()
-        self._dirty |= self.leader != leader or self.words(before) != self.words(self.room)
+        if (words := self.words(self.room)) != self.settings.room:
+            self.change(room=words)
+
+    def refresh(self) -> None:
+        super().refresh()
+        if self.settings.bar is not None:
+            update_html(self.settings.bar, self.bar())
+            self.refreshed()
 
     def tick(self, now: float) -> None:
+        super().tick(now)
         again = self._sharing.tick(now)
-        if self._settles is not None and now >= self._settles:
-            self._settles = None
-            self.follower.settle()
-        if self._dirty and now >= self._next:
-            self._dirty, self._next = False, now + REFRESH
-            if self._bar is not None:
-                self.refresh()
-                update_html(self._bar, self.bar())
-        left = self._next - now if self._dirty else IDLE
-        if self._armed[0] and now >= self._armed[1]:
-            self._armed, self._dirty, left = ("", 0.0), True, 0.0
-        elif self._armed[0]:
-            left = min(left, self._armed[1] - now)
-        if self._settles is not None:
-            left = min(left, self._settles - now)
-        self.due = max(0.0, min(left, IDLE if again is None else again))
-
-    def on_style(self) -> None:
-        self._dirty = True
+        self.due = min(due for due in (self.due, again, IDLE) if due is not None)
 
     def allows(self, key: Hashable, value: object) -> bool:
         """Whether an event may act on the page."""
         act = act_of(key, value, self.page.features)
         if not act:
             return True
-        fresh = self.leader and time.perf_counter() - self._began < GRACE
+        fresh = self.leader and time.perf_counter() - self.follower.began < GRACE
         if fresh and not self.frozen and act in ("gizmo", "grab", "joint"):
             self.page.put_back()
             return False
-        leader, why = self.leader, self.refusal(act)
-        if why:
+        if why := self.refusal(act):
             self.page.refuse(key, why)
-        self._dirty |= self.leader != leader
         self.due = 0.0
         return not why
 
@@ -199,30 +220,30 @@ class Member(Feature):
         if leader != self.leader:
             if not self.leader and title and before is not None:
                 self.page.record(title, before)
-            self.leader, self._began = leader, time.perf_counter()
+            self.change(leader=leader)
             self.page.set_following(True)
             self.follower.begin()
         self.follower.show(text)
-        if self.follower.moving:
-            self._settles = time.perf_counter() + SETTLED
 
     def free(self) -> None:
         """Nobody leads this page any more."""
         if self.leader:
-            self.leader, self._settles = "", None
+            self.change(leader="")
+            self.follower.moving = False
             self.page.set_following(False)
 
     def twice(self, what: Hashable) -> bool:
         """Whether a button that needs two presses was pressed for the second time."""
-        left = self._armed[1] - time.perf_counter() if self._armed[0] == what else 0.0
-        if left > AGAIN - SURE:
+        armed, now = self.settings.armed, time.perf_counter()
+        since = now - armed[1] if armed is not None and armed[0] == what else math.inf
+        if since < SURE:
             return False
-        self._armed = ("", 0.0) if left > 0.0 else (what, time.perf_counter() + AGAIN)
-        return left > 0.0
+        self.change(armed=None if since < AGAIN else (what, now))
+        return since < AGAIN
 
     def is_armed(self, what: Hashable) -> bool:
         """Whether such a button waits for the second press."""
-        return self._armed[0] == what
+        return self.settings.armed is not None and self.settings.armed[0] == what
 
     def try_to(self, action: Callable[[], object]) -> bool:
         """Ask the room for something; says in the status line why it was refused."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,9 +12,7 @@ from app.classroom.views import NewAttempt, Recalled
 from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
-from app.viewer.feature import Stage
-from app.viewer.panel import update_html
-from app.viewer.panel.part import add_html
+from app.viewer.declared.panel import Html, Node
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.member import Member, wanted
@@ -40,13 +38,8 @@ class Student(Member):
 
     messages = frozenset({"go", "back", "hand", "vote", "read", "task"})
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
-        self.activity = stage.activity
-        gui = stage.client.gui
-        self._head = add_html(gui)
-        self._question = add_html(gui)
-        self._stored = add_html(gui)
+    def built(self) -> None:
+        self.activity = self.stage.activity
         self._gone = False  # whether the student has stopped following
         self._leader_before = ""
         self._task_at: float | None = None
@@ -59,7 +52,9 @@ class Student(Member):
         # The exercise on show, `_gone` and what is driven, as the room was last sent them.
         self._sent_last: tuple[str, bool, str] | None = None
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
-        self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
+        self._submissions = Submissions(
+            self.attendance.submit, lambda: self.stage.post(("news", self.key, STORED))
+        )
         ticket = self.attendance.ticket
         place = ExerciseContext(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
         self.activity.take_seat(place, self)  # before what is stored of exercises in the browser is restored
@@ -322,15 +317,15 @@ class Student(Member):
                 self._gone = True
                 self._open_task(again=True)
 
-    def refresh(self) -> None:
+    def panel(self) -> Sequence[Node]:
+        task, sent = self.activity.task, self._submissions.state
+        head = views.student_html(self.room, self.mode, task, sent, self.page.guest)
+        question = views.poll_html(self.room.poll, teacher=False)
+        texts = head, question, views.stored_html(self.room, now())
+        return [Html(str, (text,)) for text in texts]
+
+    def refreshed(self) -> None:
         self._tell()
-        guest = self.page.guest
-        update_html(
-            self._head,
-            views.student_html(self.room, self.mode, self.activity.task, self._submissions.state, guest),
-        )
-        update_html(self._question, views.poll_html(self.room.poll, teacher=False))
-        update_html(self._stored, views.stored_html(self.room, now()))
         self._note()
 
     def bar(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from app.classroom.clock import now
@@ -12,10 +12,8 @@ from app.classroom.courses import Course, SentExercises, parsed
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
 from app.exercises import Exercise, ExerciseFileError
-from app.viewer.feature import Stage
+from app.viewer.declared.panel import Folder, Html, Node
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel import update_html
-from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.following import decoded, shared
@@ -45,26 +43,7 @@ class Teacher(Member):
         }
     )
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
-        gui = stage.client.gui
-        self._head = add_html(gui)
-        self._folders = [gui.add_folder(title) for title in ("Join", "Students", "Task", "Question")]
-        join, students, task, question = self._folders
-        with join:
-            self._join = add_html(gui)
-        with students:
-            self._tools = add_html(gui)
-            self._list = add_html(gui)
-            self._one = add_html(gui)  # below the student that it is about
-            self._rest = add_html(gui)
-        with task:
-            self._task = add_html(gui)
-            self._course = add_html(gui)
-        with question:
-            self._ask = add_html(gui)
-            self._tally = add_html(gui)
-        self._end = add_html(gui)
+    def built(self) -> None:
         self._picked = ""  # the student whose details are open
         self._open_tab = 0
         self._chosen: Exercise | None = None  # the exercise in the form of the task
@@ -269,9 +248,10 @@ class Teacher(Member):
             self._return()
 
     def on_activity(self) -> None:
-        self._dirty, self.due = True, 0.0  # an open course may be sent
+        self.schedule()  # an open course may be sent
 
     def on_robot(self) -> None:
+        super().on_robot()
         if self._wall is not None:  # another arm is on show than the one to return to
             self._before = None
             self._show_wall(False)
@@ -328,39 +308,45 @@ class Teacher(Member):
         return {} if self._wall is None and not self._reopens else {RESULT: True}
 
     def restore(self, state: dict[str, object]) -> None:
-        if self._bar is None:  # as the page was stored: undo neither opens nor closes the wall
+        if self.settings.bar is None:  # as the page was stored: undo neither opens nor closes the wall
             self._reopens = state.get(RESULT) is True
 
-    def refresh(self) -> None:
-        room = self.room
-        if self._reopens:
-            self._reopens = False
-            self._show_wall(not room.closed)
-        exercises = self.page.activity.exercises
+    def panel(self) -> Sequence[Node]:
+        room, activity = self.room, self.page.activity
+        exercises, courses = activity.exercises, activity.courses
         task = None if room.task is None else exercises.get(room.task.exercise)
-        update_html(self._head, views.lead_html(room))
-        if room.closed:
-            for folder in self._folders:
-                folder.visible = False
-        update_html(self._join, views.join_html(room, now()))
-        update_html(self._tools, views.tools_html(room, self._wall is not None, self.is_armed("sweep")))
-        seat = self._seat(self._picked)
-        armed = self.is_armed(("remove", self._picked))
-        courses = self.page.activity.courses
         sent = SentExercises(courses.exercises, room.own, courses.find)
         above, below = views.list_html(room, self._picked, exercises, sent)
-        update_html(self._list, above)
-        update_html(self._one, views.seat_html(room, seat, self.leader, armed, exercises, sent))
-        update_html(self._rest, below)
-        update_html(self._task, views.task_html(room, task, exercises, self._chosen, self.page.units))
-        update_html(self._course, views.course_html(room, self._offered, task))
-        update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
-        update_html(self._tally, views.poll_html(room.poll, teacher=True))
-        update_html(self._end, views.end_html(room, self.is_armed("end")))
+        armed = self.is_armed(("remove", self._picked))
+        one = views.seat_html(room, self._seat(self._picked), self.leader, armed, exercises, sent)
+        tools = views.tools_html(room, self._wall is not None, self.is_armed("sweep"))
+        form = views.task_html(room, task, exercises, self._chosen, self.page.units)
+        question = views.ask_html(room, QUESTION, CHOICES), views.poll_html(room.poll, teacher=True)
+        folders = {
+            "Join": [views.join_html(room, now())],
+            "Students": [tools, above, one, below],  # one: below the student that it is about
+            "Task": [form, views.course_html(room, self._offered, task)],
+            "Question": question,
+        }
+        return [
+            Html(str, (views.lead_html(room),)),
+            *(Folder(title, _htmls(*texts), visible=not room.closed) for title, texts in folders.items()),
+            Html(str, (views.end_html(room, self.is_armed("end")),)),
+        ]
+
+    def refreshed(self) -> None:
+        if self._reopens:
+            self._reopens = False
+            self._show_wall(not self.room.closed)
+            self.schedule()
         self._draw_wall()
 
     def bar(self) -> str:
         return views.teacher_bar(self.room, self._seat(self.leader), self._wall is not None, self._open_tab)
+
+
+def _htmls(*texts: str) -> list[Node]:
+    return [Html(str, (text,)) for text in texts]
 
 
 def _texts(value: object) -> list[str]:

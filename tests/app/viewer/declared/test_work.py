@@ -91,6 +91,14 @@ def test_work_begins_when_its_arguments_rest_and_not_more_often_than_its_pace() 
     assert two.results["one"].value == 3
 
 
+def test_results_are_the_same_object_while_work_waits() -> None:
+    one = runner()
+    before = one.results
+    for k in range(3):
+        one.go_on([work(str, k, rest=1.0)], 0.1 * k)
+    assert one.results is before, "so facts are not made again for it"
+
+
 def test_what_is_under_way_is_finished_first_if_its_result_is_kept_and_dropped_otherwise() -> None:
     for keep, expected in ((True, [1, 1, 1, 1, 2, 2]), (False, [2, 2])):
         one, values = runner(), []
@@ -331,7 +339,7 @@ class Late(Still):
 def test_the_end_of_work_in_a_part_wakes_the_tab_that_it_is_in() -> None:
     with bare_page(UR5) as page:
         tab = Tab(page)
-        part = Late(page, tab)  # type: ignore[arg-type]
+        part = Late(page, tab)
         part.tick(0.0)
         assert tab.woken.wait(30)
         assert tab.posted == [("done", ())], "as if it were the tab's own: it completes what the visitor did"
