@@ -65,15 +65,13 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene)
         self._moved = 0.0  # when the arm did last
-        self._postures = Postures(stage, self)
-        self._capability = Capability(stage, self, window, self._open_map)
+        self._postures = self.adopt(Postures(stage, self))
+        self._capability = self.adopt(Capability(stage, self, window, self._moves, self._open_map))
         self._capability.use_look(self.settings.map, None, None)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
             "more": lambda _: None,
             "click": self._click,
-            "capability": self._capability.handle,
-            "postures": self._postures.handle,
             "map": lambda press, value: self._postures.handle(("map", press), value),
         }
         self._clouds.report()
@@ -167,8 +165,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def on_robot(self) -> None:
         self._runner.end()
         self._clear()
-        self._capability.on_robot()
-        self._postures.on_robot()
+        self.for_parts(lambda part: part.on_robot())
         robot = self.stage.now.robot
         self._use(self.settings.for_robot(robot))
         self._set_cut()
@@ -181,9 +178,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def on_request(self) -> None:
         self._clouds.report()  # shows the locked joints
-        self._capability.refresh()
-        self._postures.refresh()
-        self.refresh()
+        super().on_request()
         self.due = 0.0
 
     def on_style(self) -> None:
@@ -192,43 +187,37 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._clouds.show_legend()
         if self._section is not None:
             self._section.use(units)
-        self._capability.refresh()
-        self._postures.refresh()
-        self.refresh()
-        self.due = 0.0
-
-    def on_activity(self) -> None:
-        super().on_activity()
-        self._postures.on_activity()
-        self.due = 0.0
+        super().on_style()
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._moved = time.perf_counter()
         self._postures.on_pose(T_base_tool)
         if self._section is not None:
             self._section.turn(T_base_tool[:3, 3])
-        dues = self.due, self._postures.due, None if self._section is None else DOT
+        dues = self.due, None if self._section is None else DOT
         self.due = min((due for due in dues if due is not None), default=None)
 
+    def _moves(self) -> bool:
+        """Whether the arm moves: its frames have priority."""
+        return time.perf_counter() - self._moved < MOVED
+
     def tick(self, now: float) -> None:
-        moving = now - self._moved < MOVED
-        self._clouds.advance(now, moving)
+        moves = self._moves()
+        self._clouds.advance(now, moves)
+        self.schedule()
         try:
-            self._capability.poll(now, moving)
+            super().tick(now)
+        finally:
             if self.settings.opened and self._capability.empty:
                 self._cut_as(None)
+                self.schedule()
             self._fit_view()
-        finally:
-            self.schedule()
-            super().tick(now)
-            self._postures.tick(now)
-            times = self.due, self._clouds.next_tick(now, moving), self._capability.due, self._postures.due
+            times = self.due, self._clouds.next_tick(now, moves)
             self.due = min((due for due in times if due is not None), default=None)
 
     def state(self) -> dict[str, object]:
         drawn = bool(self._clouds.nodes)
-        parts = {"capability": self._capability.state(), "postures": self._postures.state()}
-        return {**super().state(), "drawn": drawn, **parts}
+        return {**super().state(), "drawn": drawn}
 
     def restore(self, state: dict[str, object]) -> None:
         before, robot = self.settings, self.stage.now.robot
@@ -250,23 +239,15 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._listen_clicks()
         if state.get("drawn") is True:
             self._start()
-        for name, part in (("capability", self._capability), ("postures", self._postures)):
-            if isinstance(saved := state.get(name), dict):
-                part.restore(saved)
+        self.restore_parts(state)
         self.rewrite()
         self.refresh()
         self.due = 0.0
 
-    def on_leave(self) -> None:
-        super().on_leave()
-        self._capability.on_leave()
-        self._postures.on_leave()
-
     def remove(self) -> None:
+        self._capability.clear()
         super().remove()
         self._clear()
-        self._capability.clear()
-        self._postures.remove()
         self._axes.remove()
         self._show_section(False)
 

@@ -78,6 +78,7 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
 
     Args:
         window: flow control, shared with the clouds.
+        moves: whether the arm moves: its frames have priority.
         appears: called with the first voxels of a map that the visitor has started, before they are drawn.
     """
 
@@ -86,9 +87,14 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     settings_of, facts_of = MapSettings, MapFacts
 
     def __init__(
-        self, stage: Stage, tab: Feature, window: SendWindow, appears: Callable[[CapabilityMap], None]
+        self,
+        stage: Stage,
+        tab: Feature,
+        window: SendWindow,
+        moves: Callable[[], bool],
+        appears: Callable[[CapabilityMap], None],
     ) -> None:
-        self._window, self._appears = window, appears
+        self._window, self._moves, self._appears = window, moves, appears
         self._voxels: Voxels | None = None
         super().__init__(stage, tab)
 
@@ -158,15 +164,14 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         if self.facts.state != "out of time":
             super().worked(key)
 
-    def poll(self, now: float, moving: bool) -> None:
-        """Poll the map, and redraw it if it has changed; `moving`: frames of the arm have priority."""
+    def tick(self, now: float) -> None:
         try:
-            self.tick(now)
+            super().tick(now)
         finally:
             found, look = self.facts.found, self.settings.look
             if found is not None and not self._is_drawn(found, look):
                 rested = self._voxels is None or now - self._voxels.since >= REDRAW
-                if rested and self._window.is_open(moving):
+                if rested and self._window.is_open(self._moves()):
                     self._draw_map(found, look)
                 else:
                     self.due = min(POLL, POLL if self.due is None else self.due)
@@ -199,6 +204,7 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     def use_look(self, colours: str, cut: Cut | None, shown: NDArray[np.bool_] | None) -> None:
         """Draw in these colours, and only these slabs of this cut."""
         self.change(colours=colours, cut=cut, shown=shown)
+        self.schedule()
 
     def state(self) -> dict[str, object]:
         self.invalidate()
