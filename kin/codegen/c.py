@@ -26,11 +26,13 @@ from kin.codegen.tree import (
     Entry,
     Expr,
     Fill,
+    If,
     Instance,
     New,
     Operation,
     Primitive,
     Reshaped,
+    Statement,
     Table,
     View,
 )  # fmt: skip
@@ -70,6 +72,19 @@ static inline void *taken(block *b, double size) { // of bytes: products of inte
 }
 static inline void released(block *b, int count) { for (int k = 0; k < count; k++) free(b[k].p); }
 """
+CHECKED = """\
+_Noreturn void kinboard_outside(const char *file, int line, int64_t index, int64_t length);
+static inline int64_t kinboard_within(int64_t k, int64_t n, const char *file, int line) {
+  if (k < 0 || k >= n) kinboard_outside(file, line, k, n);
+  return k;
+}
+static inline int64_t kinboard_same(int64_t size, int64_t n, const char *file, int line) {
+  if (size != n) kinboard_outside(file, line, size, n);
+  return n;
+}
+#define WITHIN(k, n) kinboard_within(k, n, __FILE__, __LINE__)
+#define SAME(size, n) kinboard_same(size, n, __FILE__, __LINE__)
+"""
 ON_STACK = 4096  # numbers of an array that is on the stack although there is a heap
 LETTERS = {FLOAT: "f", INT: "i", BOOL: "b", COMPLEX: "z", WORD: "w", SINGLE: "s"}
 _ZEROS: dict[Type, str] = {FLOAT: "0.0", INT: "0", BOOL: "false", WORD: "0", SINGLE: "0"}
@@ -108,11 +123,17 @@ def name_of(kind: Type) -> str:
 
 
 class C(Emitter):
-    """The text of one kernel."""
+    """The text of one kernel.
 
-    def __init__(self, made: Instance, taken: frozenset[str], rooms: Rooms, kinds: list[Type]) -> None:
+    Args:
+        checked: whether each index is compared with its axis. Lines of the text are then those of the source.
+    """
+
+    def __init__(
+        self, made: Instance, taken: frozenset[str], rooms: Rooms, kinds: list[Type], checked: bool
+    ) -> None:
         super().__init__(made, taken)
-        self.rooms, self.kinds = rooms, kinds
+        self.rooms, self.kinds, self.checked = rooms, kinds, checked
         self.storage: list[str] = []
         self.releases: list[str] = []
         self.places: dict[int, str] = {}  # of what is made, by the id of the expression
@@ -168,6 +189,8 @@ class C(Emitter):
         return f"{mangled(kind)}_of({', '.join(items)})"
 
     def item(self, base: str, kind: TupleOf, index: int | str) -> str:
+        if self.checked and isinstance(index, str):
+            index = f"WITHIN({index}, {len(kind.items)})"
         return f"{base}.v[{index}]" if kind.alike else f"{base}._{index}"
 
     def entry(self, array: Expr, kind: ArrayOf, place: str) -> str:
@@ -177,6 +200,10 @@ class C(Emitter):
 
     def length(self, array: Expr, axis: int) -> str:
         return f"{self.text(array, ATOM)}.n{axis}"
+
+    def size(self, array: Expr) -> str:
+        assert isinstance(array.kind, ArrayOf)
+        return " * ".join(self.length(array, k) for k in range(array.kind.ndim))
 
     def of(self, kind: Type, place: str, sizes: Iterable[str]) -> str:
         return f"{mangled(kind)}_of({', '.join([place, *sizes])})"
@@ -194,6 +221,36 @@ class C(Emitter):
             base = base if low == "0" else f"{base} + {step}"
             sizes[0] = f"span({low}, {high}, {sizes[0]})"
         return self.of(value.kind, base, sizes)
+
+    def statement(self, node: Statement) -> None:
+        self.mark(node)
+        super().statement(node)
+
+    def choice(self, node: If, word: str) -> None:
+        self.mark(node)
+        super().choice(node, word)
+
+    def mark(self, node: Statement) -> None:
+        """Say where a statement is in the source."""
+        if self.checked:
+            function = self.made.function
+            line = function.__code__.co_firstlineno + getattr(node.node, "lineno", 1) - 1
+            self.lines.append(f'#line {line} "{function.__module__.replace(".", "/")}.py"')
+
+    def offset(self, array: Expr, indices: tuple[Expr, ...]) -> str:
+        if not self.checked:
+            return super().offset(array, indices)
+        assert isinstance(array.kind, ArrayOf)
+        lengths, terms = [self.length(array, k) for k in range(array.kind.ndim)], []
+        for axis, index in enumerate(indices):
+            inside = f"WITHIN({self.text(index)}, {lengths[axis]})"
+            terms.append(" * ".join([inside, *lengths[axis + 1 :]]))
+        return " + ".join(terms)
+
+    def number_at(self, value: Expr, k: str) -> Text:
+        if self.checked and isinstance(value.kind, ArrayOf) and not isinstance(value, Operation):
+            k = f"WITHIN({k}, {self.size(value)})"
+        return super().number_at(value, k)
 
     def expr(self, value: Expr) -> Text:
         if isinstance(value, Table):  # as an array: where it is passed on
@@ -250,7 +307,11 @@ class C(Emitter):
         return self.of(value.kind, f"({NAMES[item]} *)copied({place}, {array}.p, {size})", sizes)
 
     def reshaped(self, value: Reshaped) -> str:
-        return self.of(value.kind, f"{self.text(value.array, ATOM)}.p", map(self.text, value.shape))
+        text = self.of(value.kind, f"{self.text(value.array, ATOM)}.p", map(self.text, value.shape))
+        if not self.checked:
+            return text
+        count = " * ".join(self.text(each, MULTIPLY) for each in value.shape)
+        return f"(SAME({count}, {self.size(value.array)}), {text})"
 
     def operator(self, value: Operation) -> Text:
         symbol = value.symbol
@@ -346,13 +407,13 @@ def _definitions(kinds: Iterable[Type]) -> list[str]:
     return list(found.values())
 
 
-def unit(program: Program, rooms: Rooms) -> str:
-    """All kernels of a program as static functions, with what they need."""
+def unit(program: Program, rooms: Rooms, checked: bool = False) -> str:
+    """All kernels of a program as static functions, with what they need; checked: see `C`."""
     kinds: list[Type] = [ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2), ArrayOf(INT, 1), TupleOf((FLOAT, FLOAT))]
     names = {each.name for each in program.instances} | set(program.tables)
     C.shapes = {name: value.shape for name, value in program.tables.items()}
     taken = WORDS | names | {"memory", "room"}
-    texts = [C(each, taken, rooms, kinds).function() for each in program.instances]
+    texts = [C(each, taken, rooms, kinds, checked).function() for each in program.instances]
     tables = []
     for name, value in program.tables.items():
         numbers = ", ".join(map(repr, value.ravel().tolist()))
@@ -371,4 +432,5 @@ def unit(program: Program, rooms: Rooms) -> str:
         "static inline i1 counted(i1 a) { for (int64_t k = 0; k < a.n0; k++) a.p[k] = k; return a; }",
     ]
     heap = [HEAP] if rooms.heap else []
+    heap += [CHECKED] if checked else []
     return "\n".join([RUNTIME, *heap, *_definitions(dict.fromkeys(kinds)), *more, *tables, "", *texts, ""])

@@ -2,7 +2,9 @@
 
 An *entry* is a kernel that Python calls, with the types of its arguments; other kernels are reached from entries.
 All of them are in ``entries.txt``, a line each: its name, and the types as C names them, an array of floats with
-two axes ``f2``, a named tuple with its class, ``kin.workspace.region.BoundedArm(f1,f1,f1)``.
+two axes ``f2``, a named tuple with its class, ``kin.workspace.search.nearest.Cells(f2,f1,f3)``. Behind a type is what
+a kernel relies on without looking, the lengths ``[n,4]`` and the range of values ``{-1:n}``, see
+:mod:`kin.codegen.extension.wanted`.
 
 A unit has the entries of one folder and all that they reach, so that few units change with a kernel.
 """
@@ -25,17 +27,21 @@ from kin.codegen.typing import Program
 from kin.kernels.compile import brief
 
 ENTRIES = Path(__file__).parent / "entries.txt"
-_TOKEN = re.compile(r"[\w.]*\(|[fibzws]\d?|\)")
+_TOKEN = re.compile(r"([\w.]*\()|([fibzws])(\d?)((?:\[[^\]]*\])?(?:\{[^}]*\})?)|\)")
 _LETTERS = {letter: kind for kind, letter in c.LETTERS.items()}
-_OPEN = "("
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A kernel that Python calls, and the types of its arguments."""
+    """A kernel that Python calls, and the types of its arguments.
+
+    Attributes:
+        wanted: of each number and each array, items of tuples one by one, what is behind its type.
+    """
 
     kernel: Any
     kinds: tuple[Type, ...]
+    wanted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,26 +97,22 @@ def units() -> dict[str, list[str]]:
 
 def entry_of(line: str) -> Entry:
     """An entry from its line."""
-    name, _, kinds = line.partition(" ")
-    return Entry(_found(name), kinds_of(kinds))
-
-
-def kinds_of(text: str) -> tuple[Type, ...]:
-    """Types from their text."""
-    tokens = iter(_TOKEN.findall(text))
+    name, _, text = line.partition(" ")
+    tokens, wanted = _TOKEN.finditer(text), list[str]()
 
     def kinds() -> Iterator[Type]:
         for token in tokens:
-            if token == ")":
-                return
-            if token.endswith(_OPEN):
-                names = () if token == _OPEN else _found(token[:-1])._fields
+            opened, letter, axes, demand = token.groups()
+            if opened:
+                names = () if opened == "(" else _found(opened[:-1])._fields
                 yield TupleOf(tuple(kinds()), names)
+            elif letter:
+                wanted.append(demand)
+                yield ArrayOf(_LETTERS[letter], int(axes)) if axes else _LETTERS[letter]
             else:
-                kind = _LETTERS[token[0]]
-                yield ArrayOf(kind, int(token[1:])) if token[1:] else kind
+                return
 
-    return tuple(kinds())
+    return Entry(_found(name), tuple(kinds()), tuple(wanted))
 
 
 def _found(name: str) -> Any:
@@ -118,10 +120,13 @@ def _found(name: str) -> Any:
     return getattr(import_module(module), attribute)
 
 
-def translated(chosen: Iterable[Entry]) -> tuple[str, list[Prototype]]:
+def translated(chosen: Iterable[Entry], checked: bool = False) -> tuple[str, list[Prototype]]:
     """C of one unit, and how its entries are called.
 
     All but the functions of the entries are static. The text needs nothing but the mathematical library.
+
+    Args:
+        checked: whether indices are compared with the lengths of axes, which the function `kinboard_outside` is told.
 
     Raises:
         OutsideSubsetError: a construct that no C is written of.
@@ -131,7 +136,7 @@ def translated(chosen: Iterable[Entry]) -> tuple[str, list[Prototype]]:
         instance = program.add(entry.kernel, *entry.kinds)
         rooms.enter(instance, tuple(map(unknown, entry.kinds)))
         made.append((entry, instance))
-    text, names, found, functions = c.unit(program, rooms), set[str](), list[Prototype](), list[str]()
+    text, names, found, functions = c.unit(program, rooms, checked), set[str](), list[Prototype](), list[str]()
     for entry, instance in made:
         stem = f"{instance.function.__module__}.{instance.function.__name__}".replace(".", "_")
         name = next(n for k in range(1, 99) if (n := stem if k == 1 else f"{stem}_{k}") not in names)

@@ -211,7 +211,10 @@ def ranges(arcs: Array, rows: Whole, together: Flags, circular: bool, out: Array
 
 @jit
 def _put(out: Array, k: int, first: int, total: int, low: float, high: float) -> int:
-    """Insert an interval into the sorted, disjoint ones out[first:total] and join those that it touches."""
+    """Insert an interval into the sorted, disjoint ones out[first:total] and join those that it touches.
+
+    Without room for it, it is left out.
+    """
     i = first
     while i < total and out[i, 2] < low - 1e-12:
         i += 1
@@ -220,6 +223,8 @@ def _put(out: Array, k: int, first: int, total: int, low: float, high: float) ->
         low, high = min(low, out[j, 1]), max(high, out[j, 2])
         j += 1
     if j == i:
+        if total == out.shape[0]:
+            return total
         for r in range(total, i, -1):
             out[r, 1], out[r, 2] = out[r - 1, 1], out[r - 1, 2]
         out[total, 0] = k

@@ -6,7 +6,9 @@ kept by the hash of their text and command, so that a change compiles one unit a
 The compiler is clang, of the package ``ziglang`` or the machine's: gcc fuses multiplications and additions that it
 was asked not to, and its loops are slower. With ``ziglang`` any machine builds for all others.
 
-``python -m kin.codegen.extension.build FOLDER`` builds for this machine.
+``python -m kin.codegen.extension.build FOLDER`` builds for this machine. With ``--checked`` an index outside its axis,
+which reads or writes the memory of something else, is an `IndexError` that names the line. A file that is put into
+`kin` is used instead of one built for the checkout.
 """
 
 from __future__ import annotations
@@ -101,8 +103,11 @@ def options_for(level: str, system: str, zig: bool) -> list[str]:
     return own if len(own) == len(options) else [*own, "-mtune=native"]
 
 
-def texts(folder: Path, say: Say) -> Iterator[tuple[str, str]]:
-    """The names of all units and their C, kept in a folder for as long as nothing changes that it depends on."""
+def texts(folder: Path, say: Say, checked: bool = False) -> Iterator[tuple[str, str]]:
+    """The names of all units and their C, kept in a folder for as long as nothing changes that it depends on.
+
+    checked: see `wrappers.unit`.
+    """
     own = [fingerprint(wrappers.__file__), *(file.read_text("utf-8") for file in sorted(HERE.parent.rglob("*.h")))]
     for name, lines in units.units().items():
         modules = {each.rpartition(".")[0] for line in lines for each in re.findall(r"kin[\w.]+", line)}
@@ -110,9 +115,9 @@ def texts(folder: Path, say: Say) -> Iterator[tuple[str, str]]:
 
         def make(beside: Path, name: str = name, lines: list[str] = lines) -> None:
             say(f"translating {name}")
-            beside.write_text(wrappers.unit(name, map(units.entry_of, lines)), "utf-8")
+            beside.write_text(wrappers.unit(name, map(units.entry_of, lines), checked), "utf-8")
 
-        yield name, _kept(folder / f"{key_of(own, depends, lines)}.c", make).read_text("utf-8")
+        yield name, _kept(folder / f"{key_of(own, depends, lines, checked)}.c", make).read_text("utf-8")
 
 
 def build(made: Iterable[tuple[str, str]], folder: Path, level: str, system: str, say: Say) -> Path:
@@ -215,6 +220,7 @@ def main() -> int:
     parser.add_argument("folder", type=Path, help="where it is put, with what is needed to build it again quickly")
     parser.add_argument("--level", choices=LEVELS, default=next(levels()), help="processors (default: this one)")
     parser.add_argument("--system", choices=_LINKED, default=own_system(), help="(default: this one)")
+    parser.add_argument("--checked", action="store_true", help="an index outside its axis is an IndexError; slow")
     given = parser.parse_args()
     started, terminal, said = time.monotonic(), sys.stderr.isatty(), -math.inf
 
@@ -227,7 +233,7 @@ def main() -> int:
             print(line, end="\r" if terminal else "\n", file=sys.stderr, flush=True)
 
     try:
-        print(build(texts(given.folder / "texts", say), given.folder, given.level, given.system, say))
+        print(build(texts(given.folder / "texts", say, given.checked), given.folder, given.level, given.system, say))
         prune(given.folder)
     except (BuildError, OutsideSubsetError) as error:
         print(error)

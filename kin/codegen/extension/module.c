@@ -88,17 +88,27 @@ static struct { char letter; const char *formats; size_t size; PyObject *dtype; 
 static PyObject *ndarray, *numpy_bool, *numpy_empty;
 static bool readable;
 
-static _Thread_local jmp_buf *out_of_memory;
+enum { DONE, NO_MEMORY, OUTSIDE };
+static _Thread_local jmp_buf *failed;
+static _Thread_local struct { const char *file; int line; long long index, length; } outside;
 
-void kinboard_no_memory(void) { longjmp(*out_of_memory, 1); }
+_Noreturn void kinboard_no_memory(void) { longjmp(*failed, NO_MEMORY); }
 
-// Whether a kernel came to its end: the arrays that it made are lost where memory is not enough for another one.
-static bool run(const kinboard_entry *entry, kinboard_slot *slots, block *room) {
+// An index that a unit which looks at them has found.
+_Noreturn void kinboard_outside(const char *file, int line, int64_t index, int64_t length) {
+  outside.file = file, outside.line = line, outside.index = index, outside.length = length;
+  longjmp(*failed, OUTSIDE);
+}
+
+// How a kernel ended: unless it is done, the arrays that it made are lost.
+static int run(const kinboard_entry *entry, kinboard_slot *slots, block *room) {
   jmp_buf here;
-  out_of_memory = &here;
-  if (setjmp(here) != 0) return false;
-  entry->call(slots, room);
-  return true;
+  failed = &here;
+  switch (setjmp(here)) {
+    case DONE: entry->call(slots, room); return DONE;
+    case OUTSIDE: return OUTSIDE;
+    default: return NO_MEMORY;
+  }
 }
 
 // ---- arguments ----
@@ -275,6 +285,26 @@ static const kinboard_entry *entry_at(int64_t index) {
   return NULL;
 }
 
+// The lengths of all arrays, and whole numbers, beside what is wanted of them.
+static PyObject *misfit(const kinboard_entry *entry, const kinboard_slot *slots, const char *wrong) {
+  char given[600] = "";
+  size_t used = 0;
+  for (const char *c = entry->takes; *c && used + 120 < sizeof given; c++) {
+    if (*c == '(' || *c == ')') continue;
+    bool is_array = '0' <= c[1] && c[1] <= '9';
+    int ndim = is_array ? c[1] - '0' : 0;
+    for (int k = 1; k <= ndim; k++) used += (size_t)snprintf(given + used, 24, k == 1 ? " [%lld" : ",%lld", (long long)slots[k].i);
+    if (is_array) used += (size_t)snprintf(given + used, 24, "]"), c += 2;
+    else if (*c == 'i') used += (size_t)snprintf(given + used, 24, " %lld", (long long)slots->i);
+    slots += 1 + ndim;
+  }
+  return PyErr_Format(PyExc_TypeError, "%s: %s does not fit: %s is wanted, given is%s", entry->name, wrong, entry->wanted, given);
+}
+
+static PyObject *index_error(const kinboard_entry *entry) {
+  return PyErr_Format(PyExc_IndexError, "%s: %s, line %d: index %lld of %lld", entry->name, outside.file, outside.line, outside.index, outside.length);
+}
+
 static PyObject *called(PyObject *self, PyObject *const *given, Py_ssize_t count) {
   const char *bound = PyBytes_AsString(self);
   kinboard_slot slots[KINBOARD_SLOTS];
@@ -284,13 +314,15 @@ static PyObject *called(PyObject *self, PyObject *const *given, Py_ssize_t count
   const int64_t *shapes = bound[sizeof entry] ? (const int64_t *)(bound + BOUND) : NULL;
   reader r = {entry, entry->takes, shapes, slots, 0};
   if (!take(&r, NULL, given, count)) return NULL;
+  const char *wrong = entry->wrong(slots);
+  if (wrong != NULL) return misfit(entry, slots, wrong);
   if (entry->arrays > 0) memset(room, 0, sizeof(block) * (size_t)entry->arrays);
   void *state = entry->brief ? NULL : PyEval_SaveThread();
-  bool done = run(entry, slots, room);
+  int end = run(entry, slots, room);
   if (state != NULL) PyEval_RestoreThread(state);
   const char *gives = entry->gives;
   kinboard_slot *from = slots;
-  PyObject *result = done ? give(&gives, &from) : PyErr_NoMemory();
+  PyObject *result = end == DONE ? give(&gives, &from) : end == OUTSIDE ? index_error(entry) : PyErr_NoMemory();
   for (int k = 0; k < entry->arrays; k++) free(room[k].p);
   return result;
 }

@@ -7,32 +7,38 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from kin.codegen import c
+from kin.codegen.extension import wanted
 from kin.codegen.source import plain
 from kin.codegen.types import NONE, ArrayOf, TupleOf, Type
 from kin.codegen.units import Entry, Prototype, Value, translated
 
-_FAILS = "void kinboard_no_memory(void);\n#define KINBOARD_NO_MEMORY kinboard_no_memory()"
+_FAILS = "_Noreturn void kinboard_no_memory(void);\n#define KINBOARD_NO_MEMORY kinboard_no_memory()"
 HEADER = (Path(__file__).parent / "unit.h").read_text(encoding="utf-8")
 
 
-def unit(name: str, entries: Iterable[Entry]) -> str:
+def unit(name: str, entries: Iterable[Entry], checked: bool = False) -> str:
     """C of some entries and of all kernels that they need, with the table ``kinboard_unit_NAME`` of the entries.
+
+    Args:
+        checked: whether each index is compared with its axis, and one outside is an error.
 
     Raises:
         OutsideSubsetError: one of the kernels cannot be translated.
     """
-    kernels, prototypes = translated(entries)
+    kernels, prototypes = translated(entries, checked)
     rows = [f"  {_row(each)}," for each in prototypes]
     table = ["static const kinboard_entry entries[] = {", *rows, "};"]
     made = f"const kinboard_unit kinboard_unit_{name} = {{entries, {len(rows)}}};\n"
-    return "\n".join([_FAILS, kernels, HEADER, *map(_call, prototypes), *table, made])
+    functions = [text for each in prototypes for text in (wanted.check(each), _call(each))]
+    return "\n".join([_FAILS, kernels, HEADER, *functions, *table, made])
 
 
 def _row(made: Prototype) -> str:
     kernel, arguments = plain(made.entry.kernel), iter(made.arguments)
     takes = "".join(_takes(kind, arguments) for kind in made.entry.kinds)
-    texts = f'"{kernel.__module__}.{kernel.__qualname__}", "{takes}", "{_gives(made.result)}"'
-    return f"{{{texts}, call_{made.name}, {made.blocks}, {str(made.brief).lower()}}}"
+    name = f"{kernel.__module__}.{kernel.__qualname__}"
+    texts = ", ".join(f'"{text}"' for text in (name, takes, _gives(made.result), wanted.demands(made)))
+    return f"{{{texts}, wrong_{made.name}, call_{made.name}, {made.blocks}, {str(made.brief).lower()}}}"
 
 
 def _takes(kind: Type, values: Iterator[Value]) -> str:

@@ -106,7 +106,7 @@ def _part(s: Array, pieces: Array, parts: NDArray[np.int64], knots: Array, cut: 
     k = 0
     for i in range(pieces.shape[0]):
         h = (s[i + 1] - s[i]) / parts[i]
-        for m in range(parts[i]):
+        for m in range(min(parts[i], cut.shape[0] - k)):
             d = h * m
             knots[k] = s[i] + d
             for j in range(pieces.shape[1]):

@@ -56,7 +56,7 @@ def loop_of(params: Array, T: Array, F: Array) -> None:
             shift -= T[k, r] * T[k, 3]
         X[r, 3] = shift / p[SIZE_OF_ARM]
     _times(p[BEFORE : BEFORE + 12].reshape(3, 4), X, Y)
-    _times(Y, p[AFTER : AFTER + 12].reshape(3, 4), F[int(p[PLACE])])
+    _times(Y, p[AFTER : AFTER + 12].reshape(3, 4), F[int(p[PLACE]) % 6])
 
 
 @jit

@@ -160,8 +160,11 @@ def move_ends(
             sure[k] = 1.0 if _is_whole(k, inner) else 0.0
             continue
         other = 0
-        while not _overlaps(outer[i], inner[other], circular):
+        while other < inner.shape[0] and not _overlaps(outer[i], inner[other], circular):
             other += 1
+        if other == inner.shape[0]:  # its branch is no whole number
+            sure[k] = 0.0
+            continue
         for side in range(2):
             what = _moved_end(task, limits, span, off, places[i, side], out[i], side, p)
             apart = abs(wrap(outer[i, 1 + side] - inner[other, 1 + side]))

@@ -169,7 +169,7 @@ def _first_in_each(cloud: Points, grid: _Grid, held: Rows) -> None:
         for r in range(3):
             if grid.edge[r] > 0.0:
                 cube = math.floor((cloud[i, r] - grid.origin[r]) / grid.edge[r])
-                place[r] = min(cube, grid.shape[r] - 1)
+                place[r] = min(max(cube, 0), grid.shape[r] - 1)
         a, b, c = place[0], place[1], place[2]
         if count[a, b, c] < held.shape[3]:
             held[a, b, c, count[a, b, c]] = i

@@ -62,6 +62,19 @@ def pair(a):
     return other, a.shape[0]
 
 
+def picked(table, which, k):
+    return table[which[k], int(table[0, 1])]
+
+
+def folded(a, n, out):
+    for i in range(a.shape[0]):
+        out[i // n] = a[i]
+
+
+def turned(model, q):
+    return model[27 + 6] + q[0]
+
+
 def wait(a, n):
     k = 0
     while k < n and a[0] == 0.0:
@@ -94,6 +107,9 @@ KINDS = {
     inside: (TupleOf((F1, F1, FLOAT), Box._fields), F1, ArrayOf(BOOL, 1)),
     ramp: (INT, FLOAT),
     pair: (F1,),
+    picked: (F2, ArrayOf(INT, 1), INT),
+    folded: (F1, INT, F1),
+    turned: (F1, F1),
     wait: (F1, INT),
     sines: (F1, F1, F1),
     quarters: (F1, F1, F1),
@@ -101,4 +117,15 @@ KINDS = {
 }
 for _kernel in KINDS:
     _kernel.__module__ = "kin.small"  # names in C are those of modules of the core
-ENTRIES = [Entry(kernel, kinds) for kernel, kinds in KINDS.items()]
+WANTED = {
+    scaled: ("[n]", "", "[n|n+1]"),
+    last: ("[0<a,0<b]",),
+    counts: ("[n]",) * 5,
+    inside: ("[n]", "[n]", "", "[n]", "[n]"),
+    pair: ("[0<n]",),
+    picked: ("[0<a,1<b]{1@:b}", "[n]{:a}", "{:n}"),
+    folded: ("[m*n]", "[n]{1:}", "[m]"),
+    turned: ("[2+arm:n]", "[n]"),
+    wait: ("[0<n]", ""),
+}
+ENTRIES = [Entry(kernel, kinds, WANTED.get(kernel, ())) for kernel, kinds in KINDS.items()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import subprocess
 import sys
 import threading
@@ -19,13 +20,13 @@ from kin.kernels import ahead
 FLAGS = ("-std=c11", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-Wno-unused-function", "-DFP_FAST_FMA")
 
 
-def compiled(folder, *options):
+def compiled(folder, checked=False):
     """The extension of the small kernels."""
     folder.mkdir()
     source, file = folder / "all.c", folder / "_kernels.so"
-    source.write_text(wrappers.unit("small", small.ENTRIES))
+    source.write_text(wrappers.unit("small", small.ENTRIES, checked))
     (folder / "module.c").write_text(build.module_of(["small"]))
-    command = ["gcc", "-O0", *FLAGS, *options, str(source), str(folder / "module.c"), "-o", str(file), "-lm"]
+    command = ["gcc", "-O0", *FLAGS, str(source), str(folder / "module.c"), "-o", str(file), "-lm"]
     subprocess.run(command, check=True)
     return file
 
@@ -165,7 +166,7 @@ def test_another_array_never_reaches_the_kernel(module, form):
 
 
 def test_no_wrong_argument_reaches_a_kernel(module):
-    assert fuzz.refused(module) > 500
+    assert fuzz.refused(module, fuzz.wanted_of(small.ENTRIES)) > 500
 
 
 def test_an_array_that_is_only_read_may_be_read_only(module):
@@ -188,6 +189,61 @@ def test_a_shape_that_is_demanded_is_checked(module):
     with pytest.raises(IndexError, match="no entry 99"):
         module.entry(99, ())
 
+
+ARM = np.array([9.0, 9.0, 1.0, 1.0, *np.zeros(30), 0.0, 9.0, 9.0])  # two numbers, and an arm of one joint
+
+
+def changed(values, place, value):
+    found = values.copy()
+    found[place] = value
+    return found
+
+
+@pytest.mark.parametrize(
+    ("kernel", "arguments", "argument"),
+    [
+        (small.scaled, (np.zeros(3), 1.0, np.zeros(2)), r"3, out\[n\|n\+1\]"),
+        (small.scaled, (np.zeros(3), 1.0, np.zeros(5)), r"3, out\[n\|n\+1\]"),
+        (small.last, (np.zeros((2, 0)),), r"1, a\[0<a,0<b\]"),
+        (small.inside, (small.Box(np.zeros(2), np.zeros(3), 1.0), np.zeros(2), np.zeros(2, bool)), r"1, box\.high\[n\]"),
+        (small.picked, (np.zeros((1, 1)), np.zeros(1, int), 0), "1, table"),
+        (small.picked, (np.zeros((1, 2)), np.zeros(1, int), 1), "3, k{:n}"),
+        (small.picked, (np.zeros((1, 2)), np.zeros(1, int), -1), "3, k{:n}"),
+        (small.picked, (np.zeros((1, 2)), np.array([0, 1]), 0), r"2, which\[n\]{:a}"),
+        (small.picked, (np.array([[0.0, 2.0]]), np.zeros(1, int), 0), "1, table"),
+        (small.picked, (np.array([[0.0, np.nan]]), np.zeros(1, int), 0), "1, table"),
+        (small.folded, (np.zeros(6), 2, np.zeros(2)), "1, a"),
+        (small.folded, (np.zeros(0), 0, np.zeros(2)), "2, n"),
+        (small.folded, (np.zeros(0), -1, np.zeros(2)), "2, n"),
+        (small.turned, (ARM, np.zeros(2)), r"1, model\[2\+arm:n\]"),
+        (small.turned, (ARM[:-1], np.zeros(1)), "1, model"),
+        (small.turned, (ARM[:3], np.zeros(1)), "1, model"),
+        (small.turned, (changed(ARM, 2, 2.0), np.zeros(1)), "1, model"),
+        (small.turned, (changed(ARM, 3, 2.0), np.zeros(1)), "1, model"),
+        (small.turned, (changed(ARM, 35, 1.0), np.zeros(1)), "1, model"),
+        (small.turned, (changed(ARM, 35, np.nan), np.zeros(1)), "1, model"),
+    ],
+)
+def test_lengths_and_indices_that_do_not_fit_are_refused(module, kernel, arguments, argument):
+    with pytest.raises(TypeError, match=f"^kin.small.{kernel.__name__}: argument {argument}.*, does not fit: "):
+        call(module, kernel)(*arguments)
+
+
+def test_lengths_that_fit_are_taken(module):
+    for out in (np.zeros(3), np.zeros(4)):
+        assert call(module, small.scaled)(np.ones(3), 2.0, out) == 3
+        assert out[:3].tolist() == [2.0] * 3
+    assert call(module, small.picked)(np.array([[5.0, 1.0], [6.0, 1.5]]), np.array([1]), 0) == 1.5
+    assert call(module, small.folded)(np.arange(6.0), 3, out := np.zeros(2)) is None
+    assert out.tolist() == [2.0, 5.0]
+    assert call(module, small.turned)(ARM, np.ones(1)) == 1.0
+
+
+def test_a_refusal_says_what_is_wanted_and_what_is_given(module):
+    box = small.Box(np.zeros(2), np.zeros(3), 1.0)
+    wanted = r"box.low[n] box.high[n] q[n] notes[n] is wanted, given is [2] [3] [2] [4]"
+    with pytest.raises(TypeError, match=re.escape(wanted)):
+        call(module, small.inside)(box, np.zeros(2), np.zeros(4, bool))
 
 @pytest.mark.parametrize(
     "arguments",

@@ -1,0 +1,170 @@
+"""An extension that compares indices with lengths: what it finds, and that it computes the same."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+
+import fuzz
+import numpy as np
+import pytest
+import small
+
+import kin
+from kin.codegen.extension import build, wrappers
+from kin.codegen.types import FLOAT, INT, ArrayOf
+from kin.codegen.units import Entry, entry_of, units
+from kin.kernels import ahead
+from kin.kernels.compile import PLAIN
+
+F1, F2 = ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2)
+
+
+def reads(a, k):
+    return a[k]  # here
+
+
+def reads_from_the_end(a, k):
+    return a[-1 - k]  # a constant
+
+
+def writes(a, k):
+    total = 0.0
+    if k > 0:
+        total = 1.0
+    elif a[k, 0] == 0.0 and a[k + 1, 1] > 1.0:  # here
+        total = 2.0
+    a[0, k] = total
+
+
+def shows(a, k):
+    row = a[k]  # here
+    return row[0]
+
+
+def cuts(a, k):
+    part = a[1:k]
+    return part[2]  # here
+
+
+def folds(a, k):
+    table = a.reshape(2, k)  # here
+    return table[0, 0]
+
+
+def adds(a, b):
+    a[:] = b + 1.0  # here
+
+
+def names(a, k):
+    pair = (a[0], a[1])
+    return pair[k]  # here
+
+
+OVERRUNS = [
+    (reads, (F1, INT), (np.zeros(3), 3), "3 of 3"),
+    (reads, (F1, INT), (np.zeros(3), -4), "-1 of 3"),
+    (reads, (F1, INT), (np.zeros(0), 0), "0 of 0"),
+    (writes, (F2, INT), (np.zeros((1, 2)), 0), "1 of 1"),
+    (shows, (F2, INT), (np.zeros((2, 1)), 2), "2 of 2"),
+    (shows, (F2, INT), (np.zeros((2, 0)), 1), "0 of 0"),
+    (cuts, (F1, INT), (np.zeros(9), 3), "2 of 2"),
+    (cuts, (F1, INT), (np.zeros(3), 9), "2 of 2"),
+    (folds, (F1, INT), (np.zeros(5), 3), "6 of 5"),
+    (adds, (F1, F1), (np.zeros(3), np.zeros(2)), "2 of 2"),
+    (names, (F1, INT), (np.zeros(3), 2), "2 of 2"),
+]
+for _kernel, *_ in OVERRUNS:
+    _kernel.__module__ = "kin.overruns"
+KINDS = {kernel: Entry(kernel, kinds) for kernel, kinds, *_ in OVERRUNS}
+
+
+def loaded(folder, entries):
+    """An extension that looks at indices."""
+    (folder / "all.c").write_text(wrappers.unit("some", entries, checked=True))
+    (folder / "module.c").write_text(build.module_of(["some"]))
+    flags = ("-std=c11", "-O0", "-shared", "-fPIC", "-Wall", "-Wextra", "-Werror", "-Wno-unused-function")
+    subprocess.run(["gcc", *flags, "all.c", "module.c", "-o", "_kernels.so", "-lm"], cwd=folder, check=True)
+    return ahead.loaded(folder / "_kernels.so")
+
+
+@pytest.fixture(scope="module")
+def module(tmp_path_factory):
+    return loaded(tmp_path_factory.mktemp("checked"), KINDS.values())
+
+
+@pytest.mark.parametrize(("kernel", "kinds", "arguments", "index"), OVERRUNS)
+def test_an_index_outside_its_axis_is_an_error_that_names_the_line(module, kernel, kinds, arguments, index):
+    text, first = inspect.getsourcelines(kernel)
+    line = first + next(k for k, each in enumerate(text) if "# here" in each)
+    if kernel is shows and index == "0 of 0":
+        line += 1
+    place = list(KINDS).index(kernel)
+    with pytest.raises(IndexError, match=f"^kin.overruns.{kernel.__name__}: kin/overruns.py, line {line}: index {index}$"):
+        module.entry(place, ())(*arguments)
+
+
+def test_indices_inside_are_no_error(module):
+    values = np.arange(6.0)
+    for kernel, arguments, found in (
+        (reads, (values, -1), 5.0),
+        (shows, (values.reshape(3, 2), 2), 4.0),
+        (cuts, (values, 4), 3.0),
+        (folds, (values, 3), 0.0),
+        (names, (values, -1), 1.0),
+    ):
+        assert module.entry(list(KINDS).index(kernel), ())(*arguments) == found
+
+
+def test_all_that_fits_what_small_kernels_want_is_inside(tmp_path):
+    assert fuzz.refused(loaded(tmp_path, small.ENTRIES), fuzz.wanted_of(small.ENTRIES)) > 500
+
+
+def test_each_array_has_a_length_for_each_axis():
+    for line in (each for lines in units().values() for each in lines):
+        entry = entry_of(line)
+        words = [word for word in _flat(entry.kinds)]
+        assert len(words) == len(entry.wanted), line
+        for kind, demand in zip(words, entry.wanted, strict=True):
+            lengths = demand.partition("]")[0].lstrip("[") if demand.startswith("[") else ""
+            axes = len(lengths.split(",")) if lengths else 0
+            assert axes in ((kind.ndim,) if isinstance(kind, ArrayOf) and axes else (0, 1)), line
+            assert axes or not isinstance(kind, ArrayOf) or line.split()[0] == "kin.kernels.fk.all_finite", line
+
+
+def _flat(kinds):
+    for kind in kinds:
+        yield from _flat(kind.items) if hasattr(kind, "items") else (kind,)
+
+
+@pytest.mark.full
+@pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
+def test_kernels_that_are_looked_at_compute_the_same(tmp_path):
+    wanted = {"kernels", "solvers_wrist6", "solvers_srs7"}
+    texts = [each for each in build.texts(tmp_path / "texts", lambda what: None, True) if each[0] in wanted]
+    file = build.build(texts, tmp_path, next(ahead.levels()), build.own_system(), lambda what: None)
+    checked = ahead.loaded(file)
+    functions = {name: checked.entry(k, ()) for k, (name, *_) in enumerate(checked.entries())}
+    rng, compared = np.random.default_rng(60), 0
+    for robot, family in ((kin.get_robot("puma560"), "wrist6"), (kin.get_robot("iiwa14"), "srs7")):
+        q = rng.uniform(-1.0, 1.0, (70, robot.n))
+        T = kin.fk(robot, q)
+        form = kin.solvers.closed_form_of(robot)
+        calls = [
+            ("kin.kernels.fk.fk_many", (robot.model, q, np.empty((70, 4, 4)))),
+            ("kin.kernels.jacobian.jacobian_many", (robot.model, q)),
+            (
+                f"kin.solvers.{family}.batch.branches_many",
+                (form.kernels.params, T, np.full(70, np.nan), q[0].copy(), np.empty((70, 8, robot.n))),
+            ),
+        ]
+        for name, arguments in calls:
+            other = tuple(each.copy() for each in arguments)
+            result = functions[name](*arguments)
+            line = next(each for lines in units().values() for each in lines if each.split()[0] == name)
+            kernel = entry_of(line).kernel
+            expected = kernel(*other)
+            arrays = zip((*arguments, result), (*other, expected), strict=True)
+            assert all(a is b or np.array_equal(a, b, equal_nan=True) for a, b in arrays)
+            compared += 1
+    assert compared == 6
