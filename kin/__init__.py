@@ -8,14 +8,12 @@
 What most programs need is here, everything else in the package that it is about: `kin.motion`, `kin.workspace`.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
-from kin import calibration, collision, comparison, dh, doctor, escape, files, ik, motion, motors, path, workspace
+from kin import dh, files, ik
 from kin._version import __version__
-from kin.collision import Obstacle, clearance
-from kin.comparison import compare
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
-from kin.escape import leave_singularity
 from kin.files import (
     builtin_robots,
     get_robot,
@@ -40,25 +38,31 @@ from kin.ik import (
     solve_ik,
     solve_ik_many,
 )
-from kin.motion import plan_motion
-from kin.notebook import connect, save_page, show
-from kin.path import solve_path
-from kin.poses import (
-    interpolate_poses,
-    pose_exp,
-    pose_from_position_wxyz,
-    pose_from_text,
-    pose_log,
-    pose_to_text,
-    position_wxyz_from_pose,
-    rotation_from_wxyz,
-    xyz_rpy_from_pose,
-)
-from kin.postures import cuspidal, posture_map
 from kin.robot import Joint, Robot
 from kin.singularity import singularities
 from kin.transforms import wxyz_from_rotation
-from kin.warmup import warm_up
+
+if TYPE_CHECKING:
+    from kin import calibration, collision, comparison, doctor, escape, motion, motors, path, workspace
+    from kin.codegen.files import generate
+    from kin.collision import Obstacle, clearance
+    from kin.comparison import compare
+    from kin.escape import leave_singularity
+    from kin.motion import plan_motion
+    from kin.notebook import connect, save_page, show
+    from kin.path import solve_path
+    from kin.poses import (
+        interpolate_poses,
+        pose_exp,
+        pose_from_position_wxyz,
+        pose_from_text,
+        pose_log,
+        pose_to_text,
+        position_wxyz_from_pose,
+        rotation_from_wxyz,
+        xyz_rpy_from_pose,
+    )
+    from kin.postures import cuspidal, posture_map
 
 __all__ = [
     "IKOptions",
@@ -125,20 +129,42 @@ __all__ = [
     "solve_ik",
     "solve_ik_many",
     "solve_path",
-    "warm_up",
     "workspace",
     "wxyz_from_rotation",
     "xyz_rpy_from_pose",
 ]
 
+# What few programs need is loaded when they ask for it: these names, and the packages that are named above.
+_LATER = {
+    "Obstacle": "collision",
+    "clearance": "collision",
+    "compare": "comparison",
+    "connect": "notebook",
+    "cuspidal": "postures",
+    "generate": "codegen.files",
+    "interpolate_poses": "poses",
+    "leave_singularity": "escape",
+    "plan_motion": "motion",
+    "pose_exp": "poses",
+    "pose_from_position_wxyz": "poses",
+    "pose_from_text": "poses",
+    "pose_log": "poses",
+    "pose_to_text": "poses",
+    "position_wxyz_from_pose": "poses",
+    "posture_map": "postures",
+    "rotation_from_wxyz": "poses",
+    "save_page": "notebook",
+    "show": "notebook",
+    "solve_path": "path",
+    "xyz_rpy_from_pose": "poses",
+}
 
-if TYPE_CHECKING:
-    from kin.codegen.files import generate
-else:
+if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> object:
-        if name == "generate":  # few programs translate kernels
-            from kin.codegen.files import generate
-
-            return generate
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        if name not in _LATER:
+            return import_module(f"kin.{name}")
+        found = globals()[name] = getattr(import_module(f"kin.{_LATER[name]}"), name)
+        return found

@@ -29,13 +29,12 @@ METHODS = {
     if not method.startswith("_") and (inspect.isfunction(value) or isinstance(value, classmethod))
     if value.__module__.startswith("kin.")
 }
-# What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
-NO_EXAMPLE = {"connect", "save_page", "show", "warm_up"}
+# What has no example that can run here: a notebook.
+NO_EXAMPLE = {"connect", "save_page", "show"}
 # Nothing that they may be given is refused.
 NEVER_RAISES = {
     "builtin_robots",
     "files.classic_robots",
-    "warm_up",
     "workspace.capability_join",
     "wxyz_from_rotation",
 }

@@ -1,16 +1,16 @@
 """The robots that come with the package: the classics, and the library of makers' arms.
 
-The files of the classics are in ``kin/robots`` itself, those of the library in its folders. Lessons, exercises and
-docs are written for the classics; a service warms up their families of closed forms alone.
+The files of the classics are in ``kin/robots`` itself, those of the library in its folders, each with the arm's id
+as its name. Lessons, exercises and docs are written for the classics.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from kin.errors import UnknownRobotError
-from kin.files.read import load_robots
+from kin.files.read import load_toml
 from kin.named import finds_robots
 from kin.robot import Robot
 
@@ -18,7 +18,20 @@ BUILTIN = Path(__file__).parents[1] / "robots"
 FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms come first in every list
 
 
-@lru_cache(maxsize=1)
+@cache
+def _files() -> dict[str, Path]:
+    return {path.stem: path for path in sorted(BUILTIN.rglob("*.toml"))}
+
+
+@cache
+def _robot(robot_id: str) -> Robot:
+    robot = load_toml(_files()[robot_id])
+    if robot.id != robot_id:
+        raise ValueError(f"the id in {robot_id}.toml is {robot.id}")
+    return robot
+
+
+@cache
 def classic_robots() -> dict[str, Robot]:
     """The classics by id: the chapter's first, then in alphabetical order.
 
@@ -30,11 +43,11 @@ def classic_robots() -> dict[str, Robot]:
         >>> len(kin.files.classic_robots()), "ur3e" in kin.files.classic_robots(), "ur3e" in kin.builtin_robots()
         (12, False, True)
     """
-    robots = load_robots(BUILTIN)
-    return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
+    found = (robot_id for robot_id, path in _files().items() if path.parent == BUILTIN)
+    return {robot_id: _robot(robot_id) for robot_id in dict.fromkeys((*FIRST, *found))}
 
 
-@lru_cache(maxsize=1)
+@cache
 def builtin_robots() -> dict[str, Robot]:
     """The built-in robots by id: the classics first, then the library by maker and name.
 
@@ -46,13 +59,9 @@ def builtin_robots() -> dict[str, Robot]:
         >>> "panda" in kin.builtin_robots()
         True
     """
-    robots = dict(classic_robots())
-    library = [robot for folder in BUILTIN.iterdir() if folder.is_dir() for robot in load_robots(folder).values()]
-    for robot in sorted(library, key=lambda each: (not each.maker, each.maker.lower(), each.id)):
-        if robot.id in robots:
-            raise ValueError(f"two built-in robots have the id {robot.id}")
-        robots[robot.id] = robot
-    return robots
+    library = [_robot(robot_id) for robot_id in _files() if robot_id not in classic_robots()]
+    library.sort(key=lambda each: (not each.maker, each.maker.lower(), each.id))
+    return classic_robots() | {robot.id: robot for robot in library}
 
 
 @finds_robots
@@ -73,7 +82,6 @@ def get_robot(robot_id: str) -> Robot:
         >>> kin.get_robot("ur5").n
         6
     """
-    robots = builtin_robots()
-    if robot_id not in robots:
-        raise UnknownRobotError(robot_id, tuple(robots))
-    return robots[robot_id]
+    if robot_id not in _files():  # reading one file takes less time than all
+        raise UnknownRobotError(robot_id, tuple(builtin_robots()))
+    return _robot(robot_id)
