@@ -26,11 +26,12 @@ def tree_of(name: str) -> Path:
     if not folder.is_dir():
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent) as part:
-            archive = _git("archive", commit, "kin", check=True).stdout
+            archive = _git("archive", commit, "kin", "pyproject.toml", check=True).stdout
             with tarfile.open(fileobj=io.BytesIO(archive)) as files:
                 files.extractall(part, filter="data")
             # `kin` appears with all its files: another run may look for it.
             folder.mkdir()
+            (Path(part) / "pyproject.toml").rename(folder / "pyproject.toml")  # a checkout compiles its kernels
             (Path(part) / "kin").rename(folder / "kin")
     return folder
 

@@ -42,6 +42,7 @@ from kin.ik.candidates import unchecked
 from kin.ik.table import Table
 from kin.kernels import ahead
 from kin.kernels.compile import PLAIN
+from kin.kernels.plain import written
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp
 from kin.path import path_postures
 from kin.solvers import closed_form_of, family_of, general6, general7
@@ -233,7 +234,7 @@ def answer(file: Path, to: Path) -> None:
     assert PLAIN
     found = {}
     for name, (arguments, _, _) in pickle.loads(file.read_bytes()).items():
-        result = kernel_of(name)(*arguments)
+        result = written(kernel_of(name))(*arguments)
         found[name] = arguments, result
     to.write_bytes(pickle.dumps(found))
 
