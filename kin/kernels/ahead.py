@@ -120,7 +120,8 @@ def built(core: Path, level: str) -> Path:
             return found
         # -P: the core in the working folder may be another one.
         command = [sys.executable, "-P", "-m", BUILDER, str(folder), "--level", level]
-        environment = os.environ | {"KINBOARD_KERNELS": "python", "PYTHONPATH": str(core.parent)}
+        paths = [str(core.parent), *filter(None, [os.environ.get("PYTHONPATH")])]  # NumPy may be there
+        environment = os.environ | {"KINBOARD_KERNELS": "python", "PYTHONPATH": os.pathsep.join(paths)}
         ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=False)
         said = ran.stdout.strip()
         if ran.returncode:

@@ -53,7 +53,12 @@ LEVELS: Mapping[str, tuple[str, ...]] = {
     "aarch64": (),
 }
 LINUX, MACOS, WINDOWS = "linux-gnu.2.17", "macos.11.0", "windows-gnu"
-_LINKED: Mapping[str, tuple[str, ...]] = {LINUX: ("-lm",), MACOS: ("-Wl,-undefined,dynamic_lookup",), WINDOWS: ()}
+# Without `-nostdlib` zig compiles its own library for four seconds, of which nothing is used.
+_LINKED: Mapping[str, tuple[str, ...]] = {
+    LINUX: ("-nostdlib", "-lm", "-lc"),
+    MACOS: ("-Wl,-undefined,dynamic_lookup",),
+    WINDOWS: (),
+}
 UNUSED = 30 * 86400.0  # s: what is kept and was not used for so long is removed
 SILENT = 10.0  # s without a line in a log
 # What is kept, by its place in the folder, where there may be other files: texts, objects, extensions, and what
@@ -233,7 +238,11 @@ def main() -> int:
             print(line, end="\r" if terminal else "\n", file=sys.stderr, flush=True)
 
     try:
-        print(build(texts(given.folder / "texts", say, given.checked), given.folder, given.level, given.system, say))
+        made = texts(given.folder / "texts", say, given.checked)
+        with tempfile.TemporaryDirectory(prefix="kinboard-zig-") as zig:
+            # By itself zig keeps each object once more, and that in the home of the user, who may have none.
+            os.environ["ZIG_GLOBAL_CACHE_DIR"] = zig
+            print(build(made, given.folder, given.level, given.system, say))
         prune(given.folder)
     except (BuildError, OutsideSubsetError) as error:
         print(error)

@@ -36,13 +36,16 @@ def core(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def asked(monkeypatch):
+def asked(monkeypatch, tmp_path):
     """What kernels are in each process that has built the extension; the builder makes an empty file."""
+    monkeypatch.setenv("PYTHONPATH", "numpy-is-there")
     found = []
 
     def builder(command, **options):
         assert command[1:4] == ["-P", "-m", ahead.BUILDER]
         found.append(options["env"]["KINBOARD_KERNELS"])
+        paths = options["env"]["PYTHONPATH"].split(os.pathsep)
+        assert paths == [str(tmp_path), "numpy-is-there"]
         file = Path(command[4]) / str(len(found)) / "_kernels.so"
         file.parent.mkdir(parents=True)
         file.touch()

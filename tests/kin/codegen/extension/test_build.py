@@ -128,3 +128,17 @@ def test_files_that_others_have_put_into_the_folder_stay(tmp_path, name):
         os.utime(tmp_path / folder, (0.0, 0.0))
     build.prune(tmp_path)
     assert file.exists()
+
+
+@pytest.mark.full
+def test_a_user_without_a_home_can_build_and_nothing_of_the_compiler_stays(tmp_path, monkeypatch, capsys):
+    for name in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", "")
+    monkeypatch.setattr(build, "texts", lambda *_: texts())
+    monkeypatch.setattr(build.sys, "argv", ["build", str(tmp_path), "--level", LEVEL])
+    assert build.main() == 0
+    assert ahead.loaded(Path(capsys.readouterr().out.strip())).entries()
+    kept = Path(os.environ["ZIG_GLOBAL_CACHE_DIR"])
+    assert kept.is_absolute()
+    assert not kept.exists()
