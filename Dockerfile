@@ -40,24 +40,18 @@ COPY docs docs
 COPY kin kin
 COPY app app
 ARG VERSION
-RUN /opt/tools/bin/python -m hatchling build -t wheel \
-    && { [ -e "dist/kinboard-$VERSION-py3-none-any.whl" ] || { echo "built $(ls dist), not $VERSION" >&2; exit 1; }; } \
+# Kernels for all processors of this kind: the best that the machine has are chosen when they are loaded.
+RUN levels=$(uname -m | sed "s/x86_64/x86_64_v2 x86_64_v3 x86_64_v4/") \
+    && KINBOARD_TARGET="linux-gnu.2.17 $levels" /opt/tools/bin/python -m hatchling build -t wheel \
+    && { ls dist/kinboard-"$VERSION"-*.whl || { echo "built $(ls dist), not $VERSION" >&2; exit 1; }; } \
     && pip --python /opt/kinboard/bin/python install --no-compile --no-deps --no-index dist/*.whl
 COPY deploy/image /opt/kinboard/image
 
 
 FROM ${BASE}
 COPY --from=build /opt/kinboard /opt/kinboard
-# Machine code cached on one CPU model is ignored on any other, and compiling takes about a minute. So kernels are
-# compiled here for a fixed level that every 64-bit x86 machine of the last decade has, emulators included; the
-# empty feature list means "what the level has" instead of "what the building machine has". On ARM LLVM does not know
-# the level and falls back to its generic one.
-ARG CPU_LEVEL=x86-64-v2
 ENV PATH=/opt/kinboard/bin:$PATH \
     PYTHONUNBUFFERED=1 \
-    NUMBA_CPU_NAME=$CPU_LEVEL \
-    NUMBA_CPU_FEATURES="" \
-    NUMBA_CACHE_DIR=/opt/kinboard/kernels \
     KINBOARD_DATA=/data \
     KINBOARD_HOST=0.0.0.0 \
     KINBOARD_PORT=8000
@@ -65,8 +59,7 @@ RUN groupadd --gid 10001 kinboard \
     && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin kinboard \
     && python /opt/kinboard/image/prepare.py \
     && install --directory --owner=10001 --group=10001 --mode=700 /data
-# From here on all of this is only read. It belongs to root, as Python does: the user's own folder (KINBOARD_CACHE) would
-# have to belong to the user, which may be any.
+# From here on all of this is only read.
 ENV PYTHONDONTWRITEBYTECODE=1
 # The user kinboard, as a number: Kubernetes' runAsNonRoot does not look names up.
 USER 10001:10001

@@ -3,5 +3,5 @@
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
-install_kinboard ""
+install_kinboard "[compiler]"
 exec "$root/.venv/bin/kinboard" serve "$@"

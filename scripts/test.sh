@@ -91,25 +91,20 @@ case ${1:-} in
   "") selected="not slow and not full" ;;
   *) selected= ;;
 esac
-if [ -n "$selected" ]; then
-  # Kernels are compiled before any test, by two processes from both ends: tests that run beside each other would compile
-  # the same ones.
-  start kernels python -c 'import kin; kin.warm_up(everything=True)'
-  start backwards python -c 'from kin.warmup import warm_up_rest; warm_up_rest(backwards=True)'
-fi
+# Kernels that have changed since the installation are compiled before any test: all would wait for it.
+start kernels python -c "from kin.kernels.ahead import entries; entries()"
 step "ruff check" ruff check .
 step "ruff format" ruff format --check .
 step "the check of static/ (ESLint)" sh scripts/lint.sh
 start mypy mypy
 wait $programs && programs= || { programs=; fail "what the tests need could not be installed: the message is above."; }
+finish kernels || fail "kernels could not be compiled."
 if [ -z "$selected" ]; then
   finish mypy || fail "mypy failed."
   trap - EXIT
   rm -rf "$work"
   exec pytest "$@"
 fi
-finish kernels || fail "kernels could not be compiled."
-finish backwards || fail "kernels could not be compiled."
 
 # The files with tests of a marker: collecting all others takes longer than some of these run.
 files_of() {

@@ -486,7 +486,7 @@ def test_the_image_starts_the_way_the_app_does():
     assert "image.version=$VERSION" in DOCKERFILE
     base = re.search(r"^ARG BASE=\S*python:(\d+\.\d+)-slim", DOCKERFILE, re.MULTILINE).group(1)
     assert f"Python :: {base}" in " ".join(project["classifiers"])
-    variables = set(re.findall(r"\bKINBOARD_([A-Z_]+)=", DOCKERFILE))
+    variables = set(re.findall(r"\bKINBOARD_([A-Z_]+)=", DOCKERFILE.rpartition("\nFROM ")[2]))
     assert {name.lower() for name in variables} <= set(Settings.model_fields)
     assert re.search(r"^USER (\d+):\1$", DOCKERFILE, re.MULTILINE), "a number, for Kubernetes' runAsNonRoot"
     assert "/readyz" in DOCKERFILE.split("HEALTHCHECK")[1]

@@ -1,8 +1,8 @@
 """Last step of building the image: start the service once, as its users will, and visit it.
 
-What that leaves behind every start of every container would otherwise make anew, for seconds or a minute: compiled
-kernels in ``NUMBA_CACHE_DIR``, and bytecode of exactly those modules that a service imports. Python's own modules
-are among them; the base image comes without their bytecode.
+That leaves behind what every start of every container would otherwise make anew, for seconds: bytecode of exactly
+those modules that a service imports. Python's own modules are among them; the base image comes without their
+bytecode.
 """
 
 from __future__ import annotations
@@ -17,10 +17,8 @@ import urllib.request
 import viser
 from websockets.sync.client import connect
 
-import kin
-
 PORT = 8000
-PATIENCE = 900  # s; compiling on a small or emulated machine
+PATIENCE = 300  # s; a small or emulated machine
 FK = "/api/v1/robots/pioneer5/fk"
 PAGES = ("/", "/docs", "/openapi.json", "/static/landing.css", "/viewer/", "/api/v1/robots")
 
@@ -32,7 +30,6 @@ def main() -> int:
             visit()
         finally:
             service.terminate()
-    kin.warm_up(everything=True)  # what a service does not wait for when it starts
     return service.returncode
 
 

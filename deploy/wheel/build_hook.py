@@ -1,10 +1,12 @@
-"""Hatchling's build hook: the service is installed as ``kinboard``.
+"""Hatchling's build hook: the service is installed as ``kinboard``, its kernels as an extension.
 
-A wheel gets the renamed package, the static files and the pages of the documentation. An editable installation
-uses the checkout, where the package is called ``app``; there ``kinboard`` is another name of it.
+A wheel gets the renamed package, the static files, the pages of the documentation, and the kernels, compiled for
+this machine or for what KINBOARD_TARGET names: a system and its levels of processors, as
+`kin.codegen.extension.build` calls them. An editable installation uses the checkout, where the package is called
+``app``; there ``kinboard`` is another name of it. Its kernels are compiled into the user's cache folder, and by an
+import again when they have changed.
 
-With KINBOARD_KERNELS=c a wheel also gets the kernels as an extension, compiled for this machine, or for what
-KINBOARD_TARGET names: a system and its levels of processors, as `kin.codegen.extension.build` calls them.
+With KINBOARD_KERNELS=python nothing is compiled.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ sys.modules[__name__] = {SOURCE}
 
 
 BUILDER = "kin.codegen.extension.build"
+LOADED = "from kin.kernels.ahead import entries; entries()"
+WITHOUT = "with KINBOARD_KERNELS=python, here and where it runs, they are plain Python, a thousand times slower"
 # Where an extension for a system may be installed, by the first word of its levels.
 PLATFORMS = {
     "linux-gnu.2.17": {"x86": "manylinux_2_17_x86_64", "aarch64": "manylinux_2_17_aarch64"},
@@ -43,31 +47,29 @@ PLATFORMS = {
 
 
 class WheelHook(BuildHookInterface):
-    """Adds the package ``kinboard`` to a wheel, and the kernels if they are asked for."""
-
-    def dependencies(self) -> list[str]:
-        """What compiling the kernels needs."""
-        needed = ["numpy>=2.0,<3", "tomli-w>=1.2,<2", "ziglang>=0.17,<0.18"]
-        return needed if os.environ.get("KINBOARD_KERNELS") == "c" else []
+    """Adds the package ``kinboard`` and the kernels to a wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="kinboard-wheel-")
         package = Path(self._folder.name) / INSTALLED
         root = Path(self.root)
+        compiled = os.environ.get("KINBOARD_KERNELS") != "python"
         if version == "editable":
             package.mkdir()
             (package / "__init__.py").write_text(ALIAS, "utf-8")
             build_data["force_include_editable"][str(package)] = INSTALLED
+            if compiled:
+                self._run("c", "-c", LOADED)
         else:
             write_renamed(root / SOURCE, package)
             build_data["force_include"][str(package)] = INSTALLED
             build_data["force_include"][str(root / "static")] = f"{INSTALLED}/_static"
             for page in (root / "docs").glob("*.md"):  # agents read them
                 build_data["force_include"][str(page)] = f"{INSTALLED}/_docs/{page.name}"
-            if os.environ.get("KINBOARD_KERNELS") == "c":
-                self._add_kernels(root, build_data)
+            if compiled:
+                self._add_kernels(build_data)
 
-    def _add_kernels(self, root: Path, build_data: dict[str, Any]) -> None:
+    def _add_kernels(self, build_data: dict[str, Any]) -> None:
         target = os.environ.get("KINBOARD_TARGET", "")
         system, *levels = target.split() or [""]
         if system and (system not in PLATFORMS or not levels):
@@ -76,13 +78,22 @@ class WheelHook(BuildHookInterface):
         platform = re.sub(r"\W", "_", sysconfig.get_platform())
         for level in levels or [""]:
             options = ["--system", system, "--level", level] if level else []
-            command = [sys.executable, "-m", BUILDER, str(Path(self._folder.name) / "kernels"), *options]
-            environment = os.environ | {"KINBOARD_KERNELS": "python", "PYTHONPATH": str(root)}
-            built = subprocess.run(command, stdout=subprocess.PIPE, text=True, env=environment, check=True)
-            file = Path(built.stdout.strip())
+            file = Path(self._run("python", "-m", BUILDER, str(Path(self._folder.name) / "kernels"), *options))
             build_data["force_include"][str(file)] = f"kin/{file.name}"
             platform = PLATFORMS[system][level.split("_")[0]] if level else platform
         build_data["pure_python"], build_data["tag"] = False, f"cp311-abi3-{platform}"
+
+    def _run(self, kernels: str, *words: str) -> str:
+        """What Python prints where kernels are these; what is being compiled goes to the standard error."""
+        paths = [str(self.root), *filter(None, [os.environ.get("PYTHONPATH")])]  # pip has what is required there
+        environment = os.environ | {"KINBOARD_KERNELS": kernels, "PYTHONPATH": os.pathsep.join(paths)}
+        ran = subprocess.run(
+            [sys.executable, *words], stdout=subprocess.PIPE, text=True, env=environment, check=False
+        )
+        if ran.returncode:
+            said = ran.stdout.strip() or "kernels cannot be compiled (see above)"
+            raise RuntimeError(f"{said}; {WITHOUT}")
+        return ran.stdout.strip()
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         self._folder.cleanup()

@@ -32,7 +32,7 @@ def environment(folder: Path) -> dict[str, str]:
     for name in ("uvx", "uv", "pipx"):
         (tools / name).symlink_to(Path(sys.executable).with_name(name))
     (tools / "python3").symlink_to(Path(sys.base_prefix) / "bin" / "python3")
-    ours = ("PYTHON", "VIRTUAL_ENV", "NUMBA_", "KINBOARD_", "COV_")
+    ours = ("PYTHON", "VIRTUAL_ENV", "KINBOARD_", "COV_")
     kept = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
     return kept | {
         "PATH": f"{tools}:/usr/local/bin:/usr/bin:/bin",
