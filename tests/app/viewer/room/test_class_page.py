@@ -384,7 +384,7 @@ def test_what_is_opened_is_stored_in_the_same_step(room: Class) -> None:
     stored = len(student.kept)
     student.say("feature", ["course", ["next", 1], None])
     student.wait(lambda: len(student.kept) > stored and EXERCISE in student.html)
-    shown = next(i for i, m in enumerate(student.log) if f'data-exercise="{EXERCISE}"' in str(m.get("updates")))
+    shown = next(i for i, m in enumerate(student.log) if f'data-exercise="{EXERCISE}"' in str(m))
     assert not any(m["type"] == "SetOrientationMessage" for m in student.log[shown:]), "in the same step"
     assert opened(student)["exercises"]["at"] == EXERCISE
     assert opened(student)["course"]["at"] == 0
