@@ -1,59 +1,47 @@
-"""How a page looks: its units, its colours, and what the scene shows of the arm."""
+"""How a page looks: its units, its colours, what the scene shows of the arm, and the view of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
+from typing import Any
 
-import viser
-
-from app.viewer.feature import Feature
-from app.viewer.meshes.bodies import Bodies
-from app.viewer.own_arm import OwnArm
-from app.viewer.panel.layout import Panel
-from app.viewer.panel.status import Notice, StatusLine
+import kin
+from app.viewer.labels import size_labels, text_factor
+from app.viewer.panel.gripper import share_of
+from app.viewer.panel.status import Notice
 from app.viewer.panel.theme import configure_theme
+from app.viewer.scene.camera import Sphere
+from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.choices import ViewState
-from app.viewer.session.controller import ArmController
-from app.viewer.session.forms import Forms
-from app.viewer.session.numbers import Numbers
-from app.viewer.session.posture import PosturePanel
+from app.viewer.session.parts import Page
+from kin.transforms import Array
 from kin.units import Units
 
 
-class LooksPage(Protocol):
-    """What looks may use of a page, and change of it."""
-
-    client: viser.ClientHandle
-    arm: ArmController
-    bodies: Bodies
-    own: OwnArm | None
-    panel: Panel
-    forms: Forms
-    posture: PosturePanel
-    status: StatusLine
-    numbers: Numbers
-    units: Units
-    view: ViewState
-    system_dark: bool
-
-    @property
-    def dark(self) -> bool:
-        """Whether the page is dark."""
-
-    def renew_sliders(self) -> None:
-        """Make the sliders of the joints anew."""
-
-    def for_features(self, action: Callable[[Feature], None]) -> None:
-        """Call every feature."""
-
-
 class Looks:
-    """Changes the looks of one page. Not thread-safe: the visitor's worker calls it."""
+    """Changes the looks of one page. Not thread-safe: the visitor's worker calls it.
 
-    def __init__(self, page: LooksPage) -> None:
+    Attributes:
+        handlers: by the first part of an event's key; each takes the other parts, and the value.
+    """
+
+    def __init__(self, page: Page) -> None:
         self._page = page
+        self.handlers: dict[str, Callable[..., Any]] = {
+            "copy-as": lambda name: page.panel.share.choose(name),
+            "view": self._on_view,
+            "body": self.use_library,
+            "system-dark": lambda dark: self.use_colours(page.view.dark, bool(dark)),
+            "camera": lambda _: page.camera.aim(page.arm.scene.body, self._frames(), glide=True),
+            "fit-arm": self._fit,
+            "look-from": self._look_from,
+            "resized": self._on_resize,
+            "looked": self._on_look,  # the viewpoint is read when the camera rests
+            "frame": lambda name: page.use_frames(page.frames.choose(name)),
+            "gripper": lambda value: page.arm.scene.open_gripper(share_of(value)),
+            "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
+        }
 
     def use_units(self, units: Units) -> None:
         """Show all numbers in these units."""
@@ -121,3 +109,39 @@ class Looks:
         scene.show_axes(page.view.axes)
         scene.floor.use_dark(page.dark)
         scene.floor.use_units(page.units)
+
+    # What the visitor does
+
+    def _fit(self, _: object) -> None:
+        """Show the whole arm, and what there is of a program, obstacles and clouds."""
+        found: list[Sphere] = []
+        self._page.for_features(lambda feature: found.extend(feature.extents()))
+        self._page.camera.look_at_arm(self._frames(), found)
+
+    def _on_resize(self, _: object) -> None:
+        self._page.camera.refit()
+        self._on_look(None)
+
+    def _on_look(self, _: object) -> None:
+        self._page.arm.scene.size_gizmo(self._page.camera.small)
+        self._page.place_scale()
+
+    def _look_from(self, side: object, _: object = None) -> None:
+        if side not in SIDES:
+            raise kin.InputError("look-from", side, "one of " + ", ".join(SIDES))
+        self._page.camera.look_from(side, self._frames())
+
+    def _frames(self) -> Array:
+        """Origins ``(n, 3)`` of the frames of the arm where it is heading."""
+        frames: Array = kin.link_frames(self._page.now.robot, self._page.now.goal)[:, :3, 3]
+        return frames
+
+    def _on_view(self, place: str, path: str, serial: int, value: object) -> None:
+        page = self._page
+        before, chosen = page.view, page.forms.read(place, path, serial, value)
+        if chosen.units != page.units:
+            self.use_units(chosen.units)
+        if chosen.view != before:
+            self.use_view(chosen.view)
+        if chosen.view.avoid != before.avoid:
+            page.solve_again()

@@ -146,7 +146,7 @@ class VisitorPage(ShownArm, Worker):
         self.looks = Looks(self)
         self.live = LiveInput(self)
         self.driven = ""  # what a program drives with the arm
-        self._actions = Actions(self, self.live)
+        self._actions = Actions(self, self.live, self.looks)
 
     # Stage: what features may use
 

@@ -16,11 +16,12 @@ from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
-from app.viewer.session.looks import Looks
+from app.viewer.session.numbers import Numbers
 from app.viewer.session.posture import PosturePanel
 from app.viewer.session.state import PageState
 from kin import Robot
 from kin.transforms import Array
+from kin.units import Units
 
 
 class Page(Stage, Protocol):
@@ -28,10 +29,10 @@ class Page(Stage, Protocol):
 
     own: OwnArm | None
     arm: ArmController
+    units: Units
     camera: VisitorCamera
     view: ViewState
     system_dark: bool
-    looks: Looks
     channel: Channel
     panel: Panel
     forms: Forms
@@ -39,6 +40,7 @@ class Page(Stage, Protocol):
     posture: PosturePanel
     status: StatusLine
     lessons: LessonChoice
+    numbers: Numbers
 
     @property
     def features(self) -> list[Feature]:
@@ -70,6 +72,9 @@ class Page(Stage, Protocol):
 
     def set_branch(self, branch: str) -> None:
         """Request a branch from the next target on."""
+
+    def renew_sliders(self) -> None:
+        """Make the sliders of the joints anew."""
 
     def place_scale(self) -> None:
         """Write the length of the floor's scale bar where it covers nothing, as camera and tool are now."""

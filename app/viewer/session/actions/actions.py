@@ -16,12 +16,12 @@ from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.scene.gizmo import DragEvent
 from app.viewer.session.actions.arm import ArmControls
-from app.viewer.session.actions.looks import LookControls
 from app.viewer.session.actions.typed import TypedInput
 from app.viewer.session.choices import PageChoices
 from app.viewer.session.events import FENCE, MESSAGES, RULES, belongs_before, pause_within
 from app.viewer.session.history import History, Step, same, without_results
 from app.viewer.session.live import LiveInput
+from app.viewer.session.looks import Looks
 from app.viewer.session.parts import Page
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.state import PageState, decode
@@ -33,18 +33,18 @@ BURST = ("live",)  # the gesture of a program
 class Actions:
     """Handles the events of one page, and keeps its `history`."""
 
-    def __init__(self, page: Page, live: LiveInput) -> None:
-        self._page = page
+    def __init__(self, page: Page, live: LiveInput, looks: Looks) -> None:
+        self._page, self._looks = page, looks
         self.history = History()
         self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
         self._changed_at = 0.0
         self._live_until = 0.0  # until when the burst of a program may go on
-        typed = TypedInput(page)
+        typed = TypedInput(page, looks)
         self._arm = ArmControls(page, typed)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., Any]] = {
             **self._arm.handlers,
-            **LookControls(page).handlers,
+            **looks.handlers,
             **live.handlers,
             "grab": self._on_grab,
             FENCE: lambda _: page.fence.passed(),
@@ -171,12 +171,12 @@ class Actions:
         self._gesture, self._live_until = None, 0.0
         self.history.arrive()
         if state.units != page.units:
-            page.looks.use_units(state.units)
+            self._looks.use_units(state.units)
         if state.frames != page.frames:
             page.use_frames(state.frames)
         page.use_obstacles(state.obstacles)
         if state.view != page.view:
-            page.looks.use_view(state.view)
+            self._looks.use_view(state.view)
         self.adopt(state)
         if state.lesson != page.activity.lesson:
             page.lessons.open(state.lesson, state.features.get(Guide.key))

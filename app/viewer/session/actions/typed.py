@@ -12,6 +12,7 @@ from app.viewer.panel.jog import STEPS
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
+from app.viewer.session.looks import Looks
 from app.viewer.session.parts import Page
 from kin.axes import inverse
 from kin.poses import FORMS, PoseKind, read_pose
@@ -43,8 +44,8 @@ def _label(reading: str) -> str:
 class TypedInput:
     """Handles what was typed. Invalid text changes nothing; the status line and the page name it."""
 
-    def __init__(self, page: Page) -> None:
-        self._page = page
+    def __init__(self, page: Page, looks: Looks) -> None:
+        self._page, self._looks = page, looks
 
     def set_field(self, number: int, value: object) -> None:
         """A value typed beside a slider."""
@@ -143,7 +144,7 @@ class TypedInput:
     def switch_axes(self, _: object) -> None:
         """Align the gizmo with the base if it is aligned with the tool, and the reverse."""
         page = self._page
-        page.looks.use_view(replace(page.view, base_axes=not page.view.base_axes))
+        self._looks.use_view(replace(page.view, base_axes=not page.view.base_axes))
 
     def snap(self, value: object) -> None:
         """Drag the gizmo in steps, or freely."""
