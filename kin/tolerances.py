@@ -12,6 +12,10 @@ class Tolerances:
     Attributes:
         closure_position: largest position error, measured by FK, of a solution that counts as exact.
         closure_rotation: the same for the rotation error.
+        reach: how far a target may be beyond the reach of a closed form, whose arm is straight or folded then. Its
+            error has to stay below `closure_position`.
+        rounding: error of the coordinates of a target that is computed, of an arm of some metres.
+        double_root: the same of a length or an angle of which two solutions merge there: its square root.
         limit: slack on joint limits, so that a rounding error does not reject a configuration *at* a limit.
         merge: configurations closer than this in every joint are duplicates. Double roots of acos and sqrt
             split by the square root of the rounding error, hence the value far above machine epsilon.
@@ -19,6 +23,8 @@ class Tolerances:
         rotation_matrix: largest deviation of RᵀR from I in a pose; beyond it a pose is rejected, and a target made
             orthonormal if it may have been rounded (`kin.ik.problem`).
         singular: sine below which a closed form cannot determine an angle and takes it from the seed.
+        regular: smallest singular value of the Jacobian, as a share of the largest, above which a solution has no
+            other one beside it.
         at_singularity: distance to a singularity (radians, metres) below which a solution is reported as singular.
         near_miss: a candidate that misses its target or its limits by less than this in all (metres and radians
             added) is refined by a descent. Where two branches merge, a rounding error of 1e-16 in the target is
@@ -39,11 +45,15 @@ class Tolerances:
 
     closure_position: float = 1e-9
     closure_rotation: float = 1e-9
+    reach: float = 1e-10
+    rounding: float = 1e-14
+    double_root: float = 3e-7
     limit: float = 1e-9
     merge: float = 1e-7
     geometry: float = 1e-9
     rotation_matrix: float = 1e-6
     singular: float = 1e-11
+    regular: float = 1e-4
     at_singularity: float = 1e-4
     near_miss: float = 1e-6
     point_met: float = 1e-7

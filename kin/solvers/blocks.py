@@ -29,7 +29,7 @@ from kin.solvers.common import UNBOUNDED, clear
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 # Metres beyond the reach of an elbow or a shoulder up to which the careful kernel decides.
 BEYOND = 10.0 * _REACH
 # Sine of a singular angle, or metres, below which the careful kernel computes: there, rounding is amplified, and

@@ -23,7 +23,7 @@ from kin.transforms import Array
 
 _MERGE = TOLERANCES.merge
 _SINGULAR = TOLERANCES.singular
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 
 # The parameter arrays of planar arms begin with the first three rows of base⁻¹ and of the tool; the links follow.
 BASE, TOOL, LINKS = 0, 12, 24

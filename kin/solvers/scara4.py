@@ -48,7 +48,7 @@ from kin.transforms import Array
 NAME = "scara4"
 TITLE = "closed form, all axes parallel"
 _PSI = RedundancyParameter("psi", "tool angle ψ", circular=True)
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 _SINGULAR = TOLERANCES.singular
 # Layout of the parameter array: base⁻¹ and the tool, see `kin.solvers.planar`; the two links; for θ1, θ2, θ3 and
 # the height the index of the joint (−1: none), its sign and offset; whether the tool is upright.

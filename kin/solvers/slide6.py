@@ -46,7 +46,7 @@ from kin.transforms import Array
 
 NAME = "slide6"
 TITLE = "closed form, sliding arm with a spherical wrist"
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
 

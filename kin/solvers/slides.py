@@ -9,10 +9,11 @@ from kin.kernels.fk import all_finite_pose
 from kin.robot import Robot
 from kin.solvers.common import clear
 from kin.solvers.contract import ClosedForm, RedundancyParameter
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 BRANCHES = ("solution 1", "solution 2")
-REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
+REGULAR = TOLERANCES.regular
 ALIKE = 1e-9  # how far beyond ±1 the cosine of an angle may be: rounding error
 
 

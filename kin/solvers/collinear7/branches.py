@@ -29,7 +29,7 @@ from kin.transforms import Array
 
 # After what `Geometry7.params` has: metres by which the forearm may miss the wrist centre and still close.
 SLACK = FOREARM + 1
-REACH = TOLERANCES.closure_position * 0.1
+REACH = TOLERANCES.reach
 _MERGE = TOLERANCES.merge
 # How the forearm lies to the upper arm.
 _BENT, _STRAIGHT, _FOLDED = range(3)

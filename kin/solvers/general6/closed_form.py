@@ -45,7 +45,7 @@ TITLE = "elimination, any six joints of which at least four turn"
 BRANCHES = tuple(f"solution {i + 1}" for i in range(SOLUTIONS))
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _MOST_SLIDES = 2  # `slides3` has three; more cannot turn the tool in every direction
-_REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
+_REGULAR = TOLERANCES.regular
 _VALID = 1e-9  # largest misfit of degree of a valid cut
 _EXACT = 1e-14  # a misfit that is rounding error
 _SIMILAR = 30.0  # misfits within this factor are as good

@@ -18,7 +18,7 @@ from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
 from kin.solvers.blocks import in_turn
 from kin.solvers.canonical import canonical_pose
-from kin.solvers.common import clear, zyz
+from kin.solvers.common import UNBOUNDED, clear, zyz
 from kin.solvers.offset7.geometry import (
     A1,
     A3,
@@ -45,7 +45,6 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _SINGULAR = TOLERANCES.singular
-_FREE = 1e6  # rad; limits that never bind
 
 
 @jit
@@ -133,7 +132,7 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows
     """
     p = params
     M, R, roots, sides = np.empty((3, 4)), np.empty((3, 3)), np.empty(2), np.empty(2)
-    low, high = np.full(7, -_FREE), np.full(7, _FREE)
+    low, high = np.full(7, -UNBOUNDED), np.full(7, UNBOUNDED)
     clear(rows)
     seen(p, T, t[0], M)
     wx, wy, wz = M[0, 3], M[1, 3], M[2, 3]

@@ -88,7 +88,7 @@ def _geometry(links: Links, is_reversed: bool, base: Array) -> Geometry | None:
     if math.hypot(cosine, sine) < TOLERANCES.geometry:
         return None
     shape = [d[0], a[0], c1, s1, d[1], c2, s2, a[2], d[2], c3, s3, x4, y4, z4, c4, s4, float(is_reversed)]
-    shape.append(TOLERANCES.closure_position * 0.1)
+    shape.append(TOLERANCES.reach)
     params = np.array([*pose_params(links.base, links.tool), *links.sign, *links.theta, *shape])
     along = 1.0 if d[4] <= 0.0 else -1.0
     return Geometry(params, is_reversed, links.sign, links.theta, math.atan2(sine, cosine), base, along)

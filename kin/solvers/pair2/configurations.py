@@ -33,7 +33,7 @@ from kin.transforms import Array
 _DECIDES = 1e-3  # of the arm's size: joint 2 moves the point enough to follow from it
 _POLISH = 4
 GONE = 1e-2  # of the arm's size: a point that is missed by more is not reached, however rounded it is
-REACH = TOLERANCES.closure_position * 0.1  # metres, the same for an exact point
+REACH = TOLERANCES.reach
 _FLOOR = 4e-16  # of the squared length of the derivatives: a floor where they are singular
 _TINY = TOLERANCES.singular
 _ALIKE = 100.0

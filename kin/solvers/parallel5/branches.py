@@ -20,7 +20,7 @@ from kin.transforms import Array
 
 ROWS = 4
 _SINGULAR = TOLERANCES.singular
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 _ROUNDING = 1e-15  # of the target's coordinates
 
 

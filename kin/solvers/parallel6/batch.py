@@ -12,6 +12,7 @@ from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.solvers.blocks import (
     BEYOND,
+    NEARLY,
     OWN,
     Arc,
     Entries,
@@ -49,7 +50,6 @@ _FRONT, _TILT, _SPIN, _SUM, _BEND, _UPPER, _END = (OWN + i for i in (0, 2, 4, 6,
 _PAIRS, _ROWS = _END - OWN, _END + _END - OWN + 1
 _REST = _PAIRS + _UPPER  # θ4
 _CLOSE = 1e-3  # of the lengths: how far apart two shoulders are that the careful kernel computes
-_ALONG = 1e-4  # the sine of θ5 below which it computes
 
 
 @inlined
@@ -96,7 +96,7 @@ def _shoulder(
     links = (a2, a3, side)
     close0 = _arm(u - p, v - q, links, S, 2 * si, 4 * si, b)
     close1 = _arm(u + p, v + q, links, S, 2 * si + 1, 4 * si + 1, b)
-    return close0 | close1 | (sine < _ALONG)
+    return close0 | close1 | (sine < NEARLY)
 
 
 @inlined

@@ -22,12 +22,11 @@ from kin.solvers.planar import planar_angles, planar_free, two_links
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
 _STEPS = 180  # that half a turn of θ1 is searched in, where it is free
-# Rounding error of a target's coordinates, metres, and of a double root of them, which is the square root of it.
-_ROUNDING, _ROUNDING_OF_DOUBLE_ROOT = 1e-14, 3e-7
+_ROUNDING, _DOUBLE_ROOT = TOLERANCES.rounding, TOLERANCES.double_root
 _FREE = 6  # column of out: 1.0 where θ6 is free
 _ORDER = (1, 2, 3, 5, 0, 4)  # joints of the columns of a box
 
@@ -102,7 +101,7 @@ def _shoulder(
         return max(abs(R - rho) - a2 - a3, abs(a2 - a3) - R - rho), found
     # Where two shoulders merge θ1 is known only approximately; a small change of it may close the rest.
     lever = abs(y) + abs(params[A4]) + abs(params[D5])
-    slack = _REACH + lever * min(_ROUNDING_OF_DOUBLE_ROOT, _ROUNDING / max(abs(x), _ROUNDING))
+    slack = _REACH + lever * min(_DOUBLE_ROOT, _ROUNDING / max(abs(x), _ROUNDING))
     gap = math.inf
     sine = math.sqrt(m02 * m02 + m12 * m12)
     cA, sA = m02 / sine, m12 / sine

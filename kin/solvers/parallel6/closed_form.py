@@ -31,7 +31,7 @@ NAME = "parallel6"
 TITLE = "closed form, three parallel axes and a wrist"
 _SPIN6 = RedundancyParameter("theta6", "θ6", joint=5, circular=True, rare=True)
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 
 
 def match(robot: Robot) -> Parallel6 | None:

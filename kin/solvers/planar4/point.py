@@ -47,7 +47,7 @@ from kin.solvers.planar4.branches import OFFSET, SIGN, SIZE
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 _BREAKS = 96
 ARCS = 256  # the most intervals of each parameter
 

@@ -10,7 +10,7 @@ from kin.angles import excess, nearest_image, wrap
 from kin.kernels.compile import jit
 from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
-from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row
+from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row
 from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, affine, angles_at, seed_arm_angle, sign_of, triangle_of
 from kin.solvers.srs7.minima import LANE_ROWS, LANES, best_of
 from kin.solvers.srs7.nearest import FARTHER, Work, add_best, add_others, refine
@@ -19,7 +19,6 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _LIMIT = TOLERANCES.limit
-_UNBOUND = 1e9  # rad; joint limits that never bind
 # (the requested ψ, NaN for the feasible one at which the joints move least from the seed; whether ψ is chosen so
 # that the joint limits hold where that is possible; whether joint 7 is a redundancy parameter as well, which keeps
 # its seed value; whether branches are left out that cannot be the nearest to the seed inside the limits).
@@ -34,7 +33,7 @@ def _box(arm: Array, seed: Array, lower: Array, upper: Array, free_roll: bool) -
     for i in range(7):
         box[STAY, i] = box[NEAR, i]
     if free_roll:
-        box[LOW, 6], box[HIGH, 6] = -_UNBOUND, _UNBOUND
+        box[LOW, 6], box[HIGH, 6] = -UNBOUNDED, UNBOUNDED
         box[STAY, 6] += 2.0 * math.pi  # limits that span a turn add no arm angle
     return box
 

@@ -23,7 +23,7 @@ U, E1, E2, SHAPE = range(4)
 STAY = 3
 # Codes of `triangle_of`.
 FITS, TOO_FAR, TOO_NEAR = range(3)
-REACH = TOLERANCES.closure_position * 0.1
+REACH = TOLERANCES.reach
 
 
 @jit

@@ -19,7 +19,7 @@ from kin.transforms import Array
 
 # Offsets into the parameter array: the first three rows of base⁻¹, joint offsets, lengths.
 BASE, OFFSET, A1, A2, D4, D6 = 0, 12, 17, 18, 19, 20
-REACH = TOLERANCES.closure_position * 0.1
+REACH = TOLERANCES.reach
 SINGULAR = TOLERANCES.singular
 
 

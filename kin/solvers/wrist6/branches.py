@@ -41,11 +41,10 @@ from kin.solvers.wrist6.geometry import (
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 _SINGULAR = TOLERANCES.singular
 _MERGE = TOLERANCES.merge
-# Rounding error of a target's coordinates, metres, and of a double root of them, which is the square root of it.
-_ROUNDING, _ROUNDING_OF_DOUBLE_ROOT = 1e-14, 3e-7
+_ROUNDING, _DOUBLE_ROOT = TOLERANCES.rounding, TOLERANCES.double_root
 
 Arm = tuple[float, float, float]  # canonical θ1, θ2, θ3
 Rotation = tuple[float, float, float, float, float, float, float, float, float]  # column after column
@@ -151,7 +150,7 @@ def _elbow(params: Array, x: float, h: float, root: float) -> tuple[float, float
     if miss > _REACH and beside != 0.0:
         edge = a2 + f if x * x + h * h > a2 * a2 + f * f else a2 - f
         nearest = math.copysign(math.sqrt(max(edge * edge - h * h, 0.0)), x)
-        if abs(nearest - x) < abs(beside) * min(_ROUNDING_OF_DOUBLE_ROOT, _ROUNDING / max(root, _ROUNDING)):
+        if abs(nearest - x) < abs(beside) * min(_DOUBLE_ROOT, _ROUNDING / max(root, _ROUNDING)):
             x = nearest
             miss, bend, c3, k1, k2 = two_links(x, h, a2, f)
     return miss, bend, c3, k1, k2, x

@@ -42,7 +42,7 @@ NAME = "wrist6"
 TITLE = "closed form, elbow arm with a spherical wrist"
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, circular=True, rare=True)
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
-_REACH = TOLERANCES.closure_position * 0.1
+_REACH = TOLERANCES.reach
 
 
 def match(robot: Robot) -> Wrist6 | None:

@@ -11,7 +11,7 @@ A1, A2, D4, D6, X, Y, H, RAD, PHI, KAY = range(10)
 JOINT, PC, PT, PR, P0, M, S = range(7)
 # Columns of a piece of θ5: the branch, its ends, the sheet, that is 2 · (tool behind axis 1) + (elbow angle < 0).
 BRANCH, START, END, SHEET = range(4)
-REACH = TOLERANCES.closure_position * 0.1
+REACH = TOLERANCES.reach
 SLACK = TOLERANCES.limit
 INSET = TOLERANCES.interval_inset
 AMBIGUOUS = 1e-6  # rad or m; a quantity smaller than this may have either sign, because of rounding
