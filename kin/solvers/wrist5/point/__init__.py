@@ -37,7 +37,7 @@ searched from the seed itself, and from the best feasible point found, by Newton
 nearest point within the limits. The result is exact and feasible, and a local minimum of the distance.
 
 Modules: `roots` (real roots of polynomials), `configuration` (one configuration, its branch), `newton` (moving a
-configuration along those that reach the point), `planes`, `theta5`, `theta4`, `intervals`, `search`, `solve`.
+configuration along those that reach the point), `planes`, `theta5`, `theta4`, `search`, `solve`.
 """
 
 from kin.solvers.wrist5.point.solve import REDUNDANCIES, solve

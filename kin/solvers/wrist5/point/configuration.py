@@ -62,13 +62,13 @@ def fits(k: Array, t4: float, t5: float, sheet: int, box: Array, q: Array) -> bo
         if high[i] - low[i] < TURN:
             over += excess(q[i], low[i], high[i])
     if 0.0 < over < AMBIGUOUS:
-        floor, ceiling, J, e, spare = np.empty(5), np.empty(5), np.empty((3, 5)), np.empty(3), np.empty(5)
+        floor, ceiling = np.empty(5), np.empty(5)
         for i in range(5):
             x = nearest_image(q[i], q[i], low[i], high[i])
             slack = AMBIGUOUS if i < 3 else SLACK
             floor[i], ceiling[i] = max(low[i], x - slack), min(high[i], x + slack)
             q[i] = min(max(x, floor[i]), ceiling[i])
-        return closes(k, floor, ceiling, J, e, spare, q)
+        return closes(k, floor, ceiling, q)
     return over == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Configurations that reach the point: their linearisation, and Newton steps along them within joint limits."""
+"""Configurations that reach the point: their linearisation, and steps along them within joint limits."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.numeric.nearby import back_onto, move_towards
 from kin.solvers.wrist5.point.constants import A1, A2, D4, D6, H, X, Y
 from kin.transforms import Array
 
-# Metres: what a Newton step aims for, and what still counts as closed.
-_TIGHT, _CLOSED = 1e-13, 1e-12
+_CLOSED = 1e-12  # metres: the point is reached
 
 
 @jit
@@ -35,105 +35,18 @@ def _linearise(k: Array, q: Array, J: Array, e: Array) -> float:
 
 
 @jit
-def _foot(q: Array, J: Array, e: Array, aim: Array, low: Array, high: Array, x: Array) -> None:
-    """x ← the point nearest to `aim` with low ≤ x ≤ high and J (x − q) = e.
-
-    By Newton steps on the dual problem, x = clamp(aim + Jᵀ λ), halved where clamps that switch lead a whole one
-    away. All vectors ``(5,)``, e ``(3,)``, J ``(3, 5)``.
-    """
-    u = v = w = du = dv = dw = 0.0
-    before, halved = math.inf, 0
-    for _ in range(40):
-        # e − J (x − q), and H = J Jᵀ over the joints that are not clamped.
-        gu, gv, gw = e[0], e[1], e[2]
-        uu = vv = ww = 1e-12
-        uv = uw = vw = 0.0
-        for i in range(5):
-            a, b, c = J[0, i], J[1, i], J[2, i]
-            free = aim[i] + a * u + b * v + c * w
-            x[i] = min(max(free, low[i]), high[i])
-            step = x[i] - q[i]
-            gu -= a * step
-            gv -= b * step
-            gw -= c * step
-            if x[i] == free:
-                uu += a * a
-                vv += b * b
-                ww += c * c
-                uv += a * b
-                uw += a * c
-                vw += b * c
-        missed = abs(gu) + abs(gv) + abs(gw)
-        if missed < 1e-15:
-            break
-        if missed > before and halved < 6:
-            halved += 1
-            du, dv, dw = 0.5 * du, 0.5 * dv, 0.5 * dw
-            u, v, w = u - du, v - dv, w - dw
-            continue
-        before, halved = missed, 0
-        # The adjugate of H, row by row, over its determinant.
-        au, av, aw = vv * ww - vw * vw, vw * uw - uv * ww, uv * vw - vv * uw
-        det = uu * au + uv * av + uw * aw
-        if not det > 0.0:
-            break
-        bv, bw, cw = uu * ww - uw * uw, uv * uw - uu * vw, uu * vv - uv * uv
-        du = (au * gu + av * gv + aw * gw) / det
-        dv = (av * gu + bv * gv + bw * gw) / det
-        dw = (aw * gu + bw * gv + cw * gw) / det
-        u, v, w = u + du, v + dv, w + dw
-
-
-@jit
-def closes(k: Array, low: Array, high: Array, J: Array, e: Array, x: Array, q: Array) -> bool:
-    """Move q ``(5,)``, in place, within [low, high] by Newton steps until it reaches the point; whether it does.
-
-    J ``(3, 5)``, e ``(3,)`` and x ``(5,)`` are scratch.
-    """
-    for _ in range(8):
-        if _linearise(k, q, J, e) < _TIGHT:
-            return True
-        _foot(q, J, e, q, low, high, x)
-        for i in range(5):
-            q[i] = x[i]
-    return _linearise(k, q, J, e) < _CLOSED
+def closes(k: Array, low: Array, high: Array, q: Array) -> bool:
+    """Move q ``(5,)``, in place, within its limits by shortest steps until it reaches the point; if it does."""
+    work = np.empty((3, 5)), np.empty(3), np.empty(5)
+    return back_onto(_linearise, k, (low, high), np.ones(5), work, q) < _CLOSED
 
 
 @jit
 def move_near(k: Array, near: Array, low: Array, high: Array, q: Array) -> bool:
     """Move q, in place, towards a box, along the configurations inside [low, high] that reach the point.
 
-    near ``(2, 5)``: lower and upper corner of that box. Each step goes to the projection of the nearest point of
-    the box onto the tangent space, or as far towards it as the distance decreases. Returns whether q reaches the
-    point.
+    near ``(2, 5)``: lower and upper corner of that box. Returns whether q reaches the point.
     """
-    J, e, x, y, aim, foot = np.empty((3, 5)), np.empty(3), np.empty(5), np.empty(5), np.empty(5), np.empty(5)
-    if not closes(k, low, high, J, e, x, q):
+    if not closes(k, low, high, q):
         return False
-    distance = math.inf
-    share = 1.0
-    for _ in range(60):
-        _linearise(k, q, J, e)
-        now = 0.0
-        for i in range(5):
-            aim[i] = min(max(q[i], near[0, i]), near[1, i])
-            now += (q[i] - aim[i]) ** 2
-        if now > distance * (1.0 - 1e-7) or share < 1e-3:
-            break
-        distance = now
-        _foot(q, J, e, aim, low, high, foot)
-        share = min(1.0, 4.0 * share)
-        while share >= 1e-3:
-            after = 0.0
-            for i in range(5):
-                y[i] = q[i] + share * (foot[i] - q[i])
-            closed = closes(k, low, high, J, e, x, y)
-            for i in range(5):
-                after += (y[i] - min(max(y[i], near[0, i]), near[1, i])) ** 2
-            if closed and after < now:
-                for i in range(5):
-                    q[i] = y[i]
-                break
-            share *= 0.25
-            _linearise(k, q, J, e)
-    return True
+    return move_towards(_linearise, k, 3, (near[0], near[1]), (low, high), np.ones(5), q)

@@ -6,21 +6,23 @@ A box ``(3, 5)`` has the seed and the joint limits as rows NEAR, LOW, HIGH, cano
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from itertools import pairwise
 
 import numpy as np
 
 from kin.angles import nearest_image
 from kin.kernels.compile import jit
-from kin.solvers.common import HIGH, LOW, NEAR
+from kin.solvers.common import HIGH, LOW, NEAR, nearest_in_arcs
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
 from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, INSET, JOINT, RAD, SHEET, START, M
-from kin.solvers.wrist5.point.intervals import SAME, Row, merge, nearest
 from kin.solvers.wrist5.point.newton import move_near
 from kin.solvers.wrist5.point.planes import planes_of
 from kin.solvers.wrist5.point.theta4 import find_spots
 from kin.solvers.wrist5.point.theta5 import theta5_intervals, window
 from kin.transforms import Array
+
+_SAME = 1e-11  # rad; values of θ4 closer than this are one
 
 
 @jit
@@ -89,8 +91,8 @@ def _refine(k: Array, best: Array, box: Array, limits: Array, relaxed: bool, ans
             keep_best(k, q, near, limits, answer)
 
 
-def explore(k: Array, box: Array, limits: Array, relaxed: bool, answer: Array) -> list[Row]:
-    """Write the best configurations inside the box into answer ``(8, 6)``; returns every feasible θ4.
+def explore(k: Array, box: Array, limits: Array, relaxed: bool, answer: Array) -> Array:
+    """Write the best configurations inside the box into answer ``(8, 6)``; returns the feasible θ4 ``(k, 3)``.
 
     With `relaxed`, the box is wider than `limits` ``(2, 5)``, and the best are those nearest to these.
     """
@@ -107,16 +109,46 @@ def explore(k: Array, box: Array, limits: Array, relaxed: bool, answer: Array) -
     ends.sort()
     marks: list[float] = []
     for t4, _ in ends:
-        if not marks or t4 - marks[-1] > SAME:
+        if not marks or t4 - marks[-1] > _SAME:
             marks.append(t4)
     middles = np.array([0.5 * (a + b) for a, b in pairwise(marks)])
     _probe(k, middles, planes, box, limits, seen, best)
-    rows = merge(ends, marks, [int(mask) for mask in seen[: len(middles)].tolist()])
-    preferred = float(box[NEAR, 3])
-    turns = np.array([nearest(rows, branch, preferred) for branch in sorted({row[0] for row in rows})])
-    _probe(k, turns, planes, box, limits, seen, best)
+    rows = _intervals(ends, marks, [int(mask) for mask in seen[: len(middles)].tolist()])
+    _probe(k, _nearest(rows, float(box[NEAR, 3])), planes, box, limits, seen, best)
     _refine(k, best, box, limits, relaxed, answer)
     return rows
+
+
+def _intervals(ends: list[tuple[float, int]], marks: list[float], seen: list[int]) -> Array:
+    """Rows (branch, low, high) from the possible ends of intervals, branch after branch.
+
+    ends: (θ4, branch), sorted; 8 is added to a branch of which a sign is a matter of rounding. marks: their
+    distinct values. seen: between each two marks, the feasible branches, one bit each.
+    """
+    rows: list[tuple[int, float, float]] = []
+    for branch in range(8):
+        bit = 1 << branch
+        for i, t4 in enumerate(marks[:-1]):
+            if seen[i] & bit:
+                if rows and rows[-1][0] == branch and rows[-1][2] == t4:
+                    rows[-1] = (branch, rows[-1][1], marks[i + 1])
+                else:
+                    rows.append((branch, t4, marks[i + 1]))
+    for t4, name in ends:
+        i = bisect_right(marks, t4) - 1
+        around = [mask for mask in (seen[i - 1 : i] if i else []) + seen[i : i + 1] if mask]
+        # An isolated point; where branches meet, its name is a matter of rounding.
+        alone = not any(mask >> name % 8 & 1 for mask in around) if name < 8 else not around
+        if alone and (name % 8, marks[i], marks[i]) not in rows:
+            rows.append((name % 8, marks[i], marks[i]))
+    return np.array(sorted(rows), dtype=np.float64).reshape(-1, 3)
+
+
+def _nearest(rows: Array, preferred: float) -> Array:
+    """Of each branch with an interval the value nearest to `preferred`."""
+    _, first = np.unique(rows[:, 0], return_index=True)
+    spans = pairwise([*first.tolist(), len(rows)])
+    return np.array([nearest_in_arcs(rows, *span, preferred) for span in spans])
 
 
 def _edges(k: Array, planes: list[list[float]], start: float, stop: float) -> list[float]:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from kin.angles import excess, nearest_image
+from kin.solvers.canonical import at_every_turn
 from kin.solvers.common import HIGH, LOW
 from kin.solvers.contract import Candidates, Obstacle, RedundancyParameter, SolverInput
 from kin.solvers.wrist5.geometry import Geometry
 from kin.solvers.wrist5.point.constants import REACH
-from kin.solvers.wrist5.point.intervals import Row, as_joint_values, union
 from kin.solvers.wrist5.point.planes import planes_of
 from kin.solvers.wrist5.point.search import explore
 from kin.solvers.wrist5.point.theta5 import theta5_intervals, window
@@ -43,19 +43,21 @@ def solve(geometry: Geometry, problem: SolverInput) -> Candidates:
     held = {j: float(problem.values[j - 3] + g.offset[j]) for j in (3, 4) if not math.isnan(problem.values[j - 3])}
     answer = np.full((8, 6), math.nan)
     turns = _search(k, box, held, answer)
-    tilts: list[Row] = []
+    tilts: list[tuple[int, float, float]] = []
     for branch in _found(answer):
         out[branch] = answer[branch, :5] - g.offset
         for j in held:
             out[branch, j] = problem.values[j - 3]
         tilts += _theta5_of(k, branch, answer[branch], box)
-    limits = box[LOW:]
-    arcs = as_joint_values(turns, limits[:, 3], g.offset[3]), as_joint_values(tilts, limits[:, 4], g.offset[4])
+    arcs = tuple(
+        at_every_turn(rows, float(box[LOW, j]), float(box[HIGH, j])) - np.array([0.0, g.offset[j], g.offset[j]])
+        for rows, j in ((turns, 3), (np.array(tilts, dtype=np.float64).reshape(-1, 3), 4))
+    )
     obstacle = Obstacle("given joint values") if np.isnan(out).all() else None
     return Candidates(out, out[:, 3:], arcs, 0.0, obstacle)
 
 
-def _search(k: Array, box: Array, held: dict[int, float], answer: Array) -> list[Row]:
+def _search(k: Array, box: Array, held: dict[int, float], answer: Array) -> Array:
     """answer ``(8, 6)`` ← the best configuration of each branch, given joints held; returns the feasible θ4."""
     own = box.copy()
     for j, value in held.items():
@@ -66,7 +68,7 @@ def _search(k: Array, box: Array, held: dict[int, float], answer: Array) -> list
         free[LOW:, 3] = box[LOW:, 3]
         turns = explore(k, free, free[LOW:], False, np.full((8, 6), math.nan))
     if 4 in held and excess(held[4], box[LOW, 4], box[HIGH, 4]) > 0.0:
-        turns = []
+        turns = turns[:0]
     if not _found(answer):
         # Nothing is inside the limits: drop those of one joint after the other, then all, for the least excess.
         for joints in ((0,), (1,), (2,), (3,), (4,), (0, 1, 2, 3, 4)):
@@ -78,7 +80,7 @@ def _search(k: Array, box: Array, held: dict[int, float], answer: Array) -> list
     return turns
 
 
-def _theta5_of(k: Array, branch: int, row: Array, box: Array) -> list[Row]:
+def _theta5_of(k: Array, branch: int, row: Array, box: Array) -> list[tuple[int, float, float]]:
     """The feasible θ5 of one branch at the θ4 of its answer, row ``(6,)``."""
     planes, pieces = np.empty((17, 7)), np.empty((128, 4))
     planes = planes[: planes_of(k, box[LOW], box[HIGH], planes)]
@@ -89,7 +91,7 @@ def _theta5_of(k: Array, branch: int, row: Array, box: Array) -> list[Row]:
         start, stop = window(box[LOW, 4], box[HIGH, 4])
         t5 = float(nearest_image(row[4], 0.5 * (start + stop), start, stop))
         rows = [(branch, t5, t5)]
-    return union(rows)
+    return rows
 
 
 def _found(answer: Array) -> list[int]:
