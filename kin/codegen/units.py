@@ -2,8 +2,8 @@
 
 An *entry* is a kernel that Python calls, with the types of its arguments; other kernels are reached from entries.
 All of them are in ``entries.txt``, a line each: its name, and the types as C names them, an array of floats with
-two axes ``f2``, a named tuple with its class, ``kin.workspace.search.nearest.Cells(f2,f1,f3)``. Behind a type is what
-a kernel relies on without looking, the lengths ``[n,4]`` and the range of values ``{-1:n}``, see
+two axes ``f2``, a named tuple with its class, ``kin.workspace.search.nearest.Cells(f2,f1,f3)``. Behind a type is
+what a kernel relies on without looking, the lengths ``[n,4]`` and the range of values ``{-1:n}``, see
 :mod:`kin.codegen.extension.wanted`.
 
 A unit has the entries of one folder and all that they reach, so that few units change with a kernel.
@@ -126,7 +126,7 @@ def translated(chosen: Iterable[Entry], checked: bool = False) -> tuple[str, lis
     All but the functions of the entries are static. The text needs nothing but the mathematical library.
 
     Args:
-        checked: whether indices are compared with the lengths of axes, which the function `kinboard_outside` is told.
+        checked: whether each index is compared with its axis; one outside is told to `kinboard_outside`.
 
     Raises:
         OutsideSubsetError: a construct that no C is written of.

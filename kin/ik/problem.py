@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 
@@ -308,9 +309,9 @@ def read_poses(targets: Sequence[ArrayLike] | Array, code: int, always: bool = F
     """
     count = len(targets)
     poses, errors = np.empty((count, *_POSE)), np.full(count, -1.0)
-    # Arrays that were unpickled have a data type of their own, which is equal only.
-    if isinstance(targets, np.ndarray) and targets.shape[1:] == _POSE and targets.dtype == _FLOAT:
-        straighten_many(np.ascontiguousarray(targets), FAR, poses, errors)
+    if isinstance(targets, np.ndarray) and targets.shape[1:] == _POSE:
+        with suppress(TypeError):  # of other numbers, or not aligned
+            straighten_many(np.ascontiguousarray(targets), FAR, poses, errors)
     exact = errors >= 0.0
     if always:
         exact &= errors <= EXACT

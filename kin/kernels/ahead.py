@@ -38,15 +38,14 @@ _FEATURES = {"v4": ("AVX512_SKX",), "v3": ("AVX2", "FMA3")}
 
 
 class Entry(NamedTuple):
-    """An entry of the extension, with the arguments that it takes as described in ``unit.h``."""
+    """An entry of the extension."""
 
     module: Any
     place: int
-    takes: str
 
-    def function(self, shapes: tuple[int, ...]) -> Callable[..., Any]:
-        """The function; it demands these lengths of the axes of its arrays, −1 for any, () for any of all."""
-        found: Callable[..., Any] = self.module.entry(self.place, shapes)
+    def function(self) -> Callable[..., Any]:
+        """The function, which refuses arguments that are not as ``entries.txt`` says."""
+        found: Callable[..., Any] = self.module.entry(self.place)
         return found
 
 
@@ -58,7 +57,7 @@ def entries() -> dict[str, Entry]:
         ImportError: there is no extension, and it cannot be built; says what to do.
     """
     module = loaded(_file())
-    return {name: Entry(module, k, takes) for k, (name, takes, _) in enumerate(module.entries())}
+    return {name: Entry(module, k) for k, (name, *_) in enumerate(module.entries())}
 
 
 def loaded(file: Path, readable: bool = layout.READABLE) -> Any:

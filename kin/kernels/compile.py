@@ -14,9 +14,10 @@ from collections.abc import Callable, Iterator
 from functools import cached_property, update_wrapper
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
+import numpy as np
+
 from kin.kernels import ahead
 from kin.kernels.plain import written
-from kin.transforms import is_plain
 
 C, PYTHON = "c", "python"
 MODEL = "model"
@@ -51,7 +52,7 @@ class Kernel:
     @cached_property
     def _call(self) -> Callable[..., Any]:
         entry = None if PLAIN else ahead.entries().get(self.name)
-        return written(self.py_func) if entry is None else entry.function(())
+        return written(self.py_func) if entry is None else entry.function()
 
 
 def jit(function: _Kernel) -> _Kernel:
@@ -104,7 +105,7 @@ def record(*fields: Any) -> Record:
 
 
 def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
-    """A kernel that demands the shapes of its arrays.
+    """A kernel as a function that is called without a detour.
 
     Args:
         arguments: for a C-contiguous float64 array (which may be read-only unless the kernel writes to it) its
@@ -117,16 +118,14 @@ def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
         it, and deal with whatever else they accept when that happens.
 
     Raises:
-        ImportError: the extension has no such entry, or for arrays with other numbers of axes.
+        ImportError: the extension has no such entry.
     """
-    wanted = list(_wanted(arguments))
     if PLAIN:
-        return checked(kernel, wanted)
-    shapes = [each.shape for each in wanted if each is not None]
+        return checked(kernel, list(_wanted(arguments)))
     entry = ahead.entries().get(kernel.name)
-    if entry is None or [int(each) for each in entry.takes if each.isdigit()] != list(map(len, shapes)):
-        raise ImportError(f"the extension has no entry {kernel.name} for arrays with {[*map(len, shapes)]} axes")
-    return entry.function(tuple(-1 if n is None else n for shape in shapes for n in shape))
+    if entry is None:
+        raise ImportError(f"the extension has no entry {kernel.name}")
+    return entry.function()
 
 
 def _wanted(arguments: tuple[Any, ...]) -> Iterator[Wanted | None]:
@@ -164,6 +163,8 @@ def _flat(arguments: tuple[Any, ...]) -> Iterator[Any]:
 
 def fits(value: object, shape: tuple[int | None, ...]) -> bool:
     """Whether a value is a C-contiguous array of floats with this shape."""
-    if not is_plain(value) or value.ndim != len(shape):
+    if type(value) is not np.ndarray or value.dtype != np.float64 or value.ndim != len(shape):
+        return False
+    if not (value.flags.c_contiguous and value.flags.aligned):
         return False
     return all(wanted in (None, there) for wanted, there in zip(shape, value.shape, strict=True))

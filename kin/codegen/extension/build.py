@@ -6,9 +6,9 @@ kept by the hash of their text and command, so that a change compiles one unit a
 The compiler is clang, of the package ``ziglang`` or the machine's: gcc fuses multiplications and additions that it
 was asked not to, and its loops are slower. With ``ziglang`` any machine builds for all others.
 
-``python -m kin.codegen.extension.build FOLDER`` builds for this machine. With ``--checked`` an index outside its axis,
-which reads or writes the memory of something else, is an `IndexError` that names the line. A file that is put into
-`kin` is used instead of one built for the checkout.
+``python -m kin.codegen.extension.build FOLDER`` builds for this machine. With ``--checked`` an index outside its
+axis, which reads or writes the memory of something else, is an `IndexError` that names the line. A file in `kin`
+is used instead of one built for the checkout.
 """
 
 from __future__ import annotations

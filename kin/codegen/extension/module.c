@@ -1,7 +1,6 @@
 // The module kin._kernels: calls kernels with arguments that it has checked.
 //
-// `entry(index, shapes)` makes a function of Python. It has the entry's index in its `self`, a bytes object, and
-// behind it the shapes that are demanded of all its arrays, -1 for any length.
+// `entry(index)` makes a function of Python, which has the place of the entry in its `self`, a bytes object.
 #include <setjmp.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -79,7 +78,6 @@ typedef struct {
   int flags;
 } array;
 enum { CONTIGUOUS_AND_ALIGNED = 0x0001 | 0x0100, WRITEABLE = 0x0400 };
-enum { BOUND = 16 }; // bytes of an entry in `self`: its address, and whether shapes follow
 
 static struct { char letter; const char *formats; size_t size; PyObject *dtype; const char *name; } items[] = {
   {'f', "d", 8, NULL, "float64"}, {'i', "lq", 8, NULL, "int64"}, {'b', "?", 1, NULL, "bool"},
@@ -116,7 +114,6 @@ static int run(const kinboard_entry *entry, kinboard_slot *slots, block *room) {
 typedef struct {
   const kinboard_entry *entry;
   const char *takes;
-  const int64_t *shapes; // NULL: none is demanded
   kinboard_slot *slots;
   int position;
 } reader;
@@ -127,14 +124,8 @@ static bool wrong(const reader *r, const char *wanted) {
 }
 
 static bool wrong_array(const reader *r, const char *takes, int item) {
-  char shape[160];
-  size_t used = 0;
-  for (int k = 0; k < takes[1] - '0' && used + 24 < sizeof shape; k++) {
-    if (r->shapes != NULL && r->shapes[k] >= 0) used += (size_t)snprintf(shape + used, 24, k ? ", %lld" : "%lld", (long long)r->shapes[k]);
-    else used += (size_t)snprintf(shape + used, 24, k ? ", any" : "any");
-  }
-  PyErr_Format(PyExc_TypeError, "%s: argument %d is not a C-contiguous %s%s array (%s)", r->entry->name, r->position,
-               takes[2] == 'w' ? "writable " : "", items[item].name, shape);
+  PyErr_Format(PyExc_TypeError, "%s: argument %d is not a C-contiguous %s%s array of %d axes: %s is wanted", r->entry->name, r->position,
+               takes[2] == 'w' ? "writable " : "", items[item].name, takes[1] - '0', r->entry->wanted);
   return false;
 }
 
@@ -152,7 +143,8 @@ static bool take_array(reader *r, PyObject *given) {
     fits = a->dtype == items[item].dtype && a->ndim == ndim && (a->flags & needed) == needed;
     if (fits) to->p = a->data;
     for (int k = 0; fits && k < ndim; k++) to[k + 1].i = a->shape[k];
-  } else { // the caller holds it until the call returns
+  }
+  if (!fits) { // another object may say the same type, as that of an unpickled array; the caller holds it until the call returns
     Py_buffer view;
     if (PyObject_GetBuffer(given, &view, PyBUF_FORMAT | PyBUF_C_CONTIGUOUS | (written ? PyBUF_WRITABLE : 0)) != 0) {
       PyErr_Clear();
@@ -166,11 +158,9 @@ static bool take_array(reader *r, PyObject *given) {
     for (int k = 0; fits && k < ndim; k++) to[k + 1].i = view.shape[k];
     PyBuffer_Release(&view);
   }
-  for (int k = 0; fits && r->shapes != NULL && k < ndim; k++) fits = r->shapes[k] < 0 || r->shapes[k] == to[k + 1].i;
   if (!fits) return wrong_array(r, takes, item);
   r->slots += 1 + ndim;
   r->takes += 3;
-  if (r->shapes != NULL) r->shapes += ndim;
   return true;
 }
 
@@ -306,13 +296,11 @@ static PyObject *index_error(const kinboard_entry *entry) {
 }
 
 static PyObject *called(PyObject *self, PyObject *const *given, Py_ssize_t count) {
-  const char *bound = PyBytes_AsString(self);
   kinboard_slot slots[KINBOARD_SLOTS];
   block room[KINBOARD_ROOM];
   const kinboard_entry *entry;
-  memcpy(&entry, bound, sizeof entry);
-  const int64_t *shapes = bound[sizeof entry] ? (const int64_t *)(bound + BOUND) : NULL;
-  reader r = {entry, entry->takes, shapes, slots, 0};
+  memcpy(&entry, PyBytes_AsString(self), sizeof entry);
+  reader r = {entry, entry->takes, slots, 0};
   if (!take(&r, NULL, given, count)) return NULL;
   const char *wrong = entry->wrong(slots);
   if (wrong != NULL) return misfit(entry, slots, wrong);
@@ -331,26 +319,14 @@ static PyMethodDef call_definition = {"kernel", (PyCFunction)(void (*)(void))cal
 
 static PyObject *make_entry(PyObject *self, PyObject *arguments) {
   int index;
-  PyObject *shapes;
   (void)self;
-  if (!PyArg_ParseTuple(arguments, "iO:entry", &index, &shapes)) return NULL;
+  if (!PyArg_ParseTuple(arguments, "i:entry", &index)) return NULL;
   const kinboard_entry *entry = entry_at(index);
   if (entry == NULL) return PyErr_Format(PyExc_IndexError, "there is no entry %d", index);
-  Py_ssize_t axes = 0, count = PyTuple_Size(shapes);
-  if (count < 0) return NULL;
-  for (const char *c = entry->takes; *c; c++) axes += '0' <= *c && *c <= '9' ? *c - '0' : 0;
-  if (count != 0 && count != axes) return PyErr_Format(PyExc_TypeError, "%s: %zd lengths for %zd axes", entry->name, count, axes);
-  PyObject *bound = PyBytes_FromStringAndSize(NULL, BOUND + 8 * count);
+  PyObject *bound = PyBytes_FromStringAndSize(NULL, sizeof entry);
   if (bound == NULL) return NULL;
-  char *to = PyBytes_AsString(bound);
-  memset(to, 0, BOUND);
-  memcpy(to, &entry, sizeof entry);
-  to[sizeof entry] = count != 0;
-  for (Py_ssize_t k = 0; k < count; k++) {
-    int64_t length = PyLong_AsLongLong(PyTuple_GetItem(shapes, k));
-    memcpy(to + BOUND + 8 * k, &length, 8);
-  }
-  PyObject *made = PyErr_Occurred() != NULL ? NULL : PyCMethod_New(&call_definition, bound, NULL, NULL);
+  memcpy(PyBytes_AsString(bound), &entry, sizeof entry);
+  PyObject *made = PyCMethod_New(&call_definition, bound, NULL, NULL);
   Py_DecRef(bound);
   return made;
 }
@@ -387,7 +363,7 @@ static PyObject *set_up(PyObject *self, PyObject *arguments) {
 
 static PyMethodDef methods[] = {
   {"set_up", set_up, METH_VARARGS, "set_up(ndarray, bool_, empty, dtypes, readable): before any entry is called."},
-  {"entry", make_entry, METH_VARARGS, "entry(index, shapes): an entry as a function; shapes () or all lengths, -1 for any."},
+  {"entry", make_entry, METH_VARARGS, "entry(index): an entry as a function."},
   {"entries", list_entries, METH_NOARGS, "entries(): the name of each entry, what it takes and what it gives."},
   {NULL, NULL, 0, NULL},
 };

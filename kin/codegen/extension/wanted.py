@@ -12,9 +12,9 @@ brackets behind a type, ``f2[n,4]``: a name is one length wherever it stands in 
 ``i[p]``               no length, but the value of a whole number
 =====================  ===========================================================================================
 
-Values that are used as indices have their range in braces, ``i{:n}`` from 0 and ``i1[k]{-1:n}`` from −1, each below
-n; without an end there is none. ``{0@:m,1-3@:n}`` is about these places of the last axis. Floats are such values
-too: rows of a table carry the numbers of branches and joints.
+Values that are used as indices have their range in braces, ``i{:n}`` from 0 and ``i1[k]{-1:n}`` from −1, each
+below n; without an end there is none. ``{0@:m,1-3@:n}`` is about these places of the last axis. Floats are such
+values too: rows of a table carry the numbers of branches and joints.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def demands(made: Prototype) -> str:
 
 
 def check(made: Prototype) -> str:
-    """The function ``wrong_NAME`` of the slots of a call: NULL, or a text that says which argument does not fit."""
+    """The function ``wrong_NAME`` of the slots of a call: NULL, or which argument does not fit."""
     items, names, lines = list(_items(made)), dict[str, str](), ["  (void)slots;"]
     lengths = [(each, place, text) for each in items for place, text in each.lengths]
     for each, place, text in lengths:

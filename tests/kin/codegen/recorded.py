@@ -89,8 +89,8 @@ def recorded() -> dict[str, Call]:
     calls: dict[str, Call] = {}
     function = ahead.Entry.function
 
-    def recording(entry: ahead.Entry, shapes: tuple[int, ...]) -> Callable[..., Any]:
-        call, name = function(entry, shapes), entry.module.entries()[entry.place][0]
+    def recording(entry: ahead.Entry) -> Callable[..., Any]:
+        call, name = function(entry), entry.module.entries()[entry.place][0]
 
         def called(*arguments: Any) -> Any:
             if name in calls:
@@ -219,7 +219,7 @@ def record(file: Path) -> None:
             ik_branches(robot, np.stack([T, T]))
     *given, distance = calls[PROBES][0]
     some = copied((*given, distance[:20]))
-    calls[PROBES] = copied(some), some, ahead.entries()[PROBES].function(())(*some)
+    calls[PROBES] = copied(some), some, ahead.entries()[PROBES].function()(*some)
     file.write_bytes(pickle.dumps(calls))
 
 

@@ -18,10 +18,11 @@ import pytest
 from recorded import copied, kernel_of, same
 
 import kin
+from kin.codegen.extension import build
 from kin.codegen.source import PRIMITIVES, plain
 from kin.codegen.typing import Program
 from kin.codegen.units import entry_of, units
-from kin.kernels.ahead import entries, levels
+from kin.kernels.ahead import entries, levels, loaded
 from kin.kernels.compile import PLAIN
 from kin.kernels.plain import written
 from kin.workspace.region import Region
@@ -144,5 +145,36 @@ def test_python_computes_the_bits_of_some_kernels():
     }
     for name, arguments in calls.items():
         given = copied(arguments)
-        assert same(entries()[name].function(())(*given), written(kernel_of(name))(*arguments))
+        assert same(entries()[name].function()(*given), written(kernel_of(name))(*arguments))
         assert same(given, arguments)
+
+
+def resized(value):
+    """An argument with one of its arrays one shorter, or longer, in one axis."""
+    if isinstance(value, tuple):
+        for k, each in enumerate(value):
+            yield from ((*value[:k], other, *value[k + 1 :]) for other in resized(each))
+    for axis in range(value.ndim if isinstance(value, np.ndarray) else 0):
+        before = (slice(None),) * axis
+        yield np.ascontiguousarray(value[(*before, slice(-1))])
+        yield np.concatenate([value, value[(*before, slice(1))]], axis=axis)
+
+
+@pytest.mark.full
+def test_no_recorded_call_reads_or_writes_beside_an_array(calls, tmp_path):
+    texts = build.texts(tmp_path / "texts", lambda what: None, checked=True)
+    file = build.build(texts, tmp_path, next(levels()), build.own_system(), lambda what: None)
+    module, refused = loaded(file), 0
+    for index, (name, *_) in enumerate(module.entries()):
+        if name not in calls[0]:
+            continue
+        function, (before, *found) = module.entry(index), calls[0][name]
+        given = copied(before)
+        result = function(*given)
+        assert same((given, result), tuple(found)), name
+        for other in resized(before):
+            try:
+                function(*copied(other))  # an index outside its axis is an IndexError
+            except TypeError as error:
+                refused += "does not fit" in str(error)
+    assert refused > 2000

@@ -1,8 +1,8 @@
 """``python fuzz.py FILE``: calls every entry of an extension with one argument that is wrong, in every way.
 
-Each call must be a TypeError: none may reach the kernel. An array that is one shorter or longer in one axis is that,
-or does no harm: in an extension that compares indices with lengths, a kernel that reads beside an array is an
-IndexError. Prints how many calls there were.
+Each call must be a TypeError: none may reach the kernel. An array that is one shorter or longer in one axis is
+that, or does no harm: in an extension that compares indices with lengths, a kernel that reads beside an array is
+an IndexError. Prints how many calls there were.
 """
 
 from __future__ import annotations
@@ -100,7 +100,9 @@ class Fitting:
         if len(word) == 1:
             found = self.names[lengths[0]] if lengths else NUMBERS.get(word, word)
             return self.ranges(k)[0][1] if self.ranges(k) and not lengths else found
-        made = np.random.default_rng(k).uniform(-1.0, 1.0, [self.length(text) for text in lengths] or [3] * int(word[1]))
+        made = np.random.default_rng(k).uniform(
+            -1.0, 1.0, [self.length(text) for text in lengths] or [3] * int(word[1])
+        )
         made = made.astype(DTYPES[word[0]]) if word[0] in "fsz" else np.zeros(made.shape, DTYPES[word[0]])
         for places, low, _ in self.ranges(k):
             made[..., places] = low
@@ -165,7 +167,7 @@ def refused(module: Any, wanted: Mapping[str, tuple[str, ...]]) -> int:
     """How many calls of all entries were refused; `wanted` by their names."""
     count = 0
     for index, (name, takes, _) in enumerate(module.entries()):
-        kernel = module.entry(index, ())
+        kernel = module.entry(index)
         fitting = Fitting(re.findall(r"[()]|[a-z]\d[rw]|[a-z]", takes), wanted[name])
         calls = [(True, arguments) for arguments in fitting.calls()] + list(fitting.others())
         for must, arguments in calls:

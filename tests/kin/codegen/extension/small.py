@@ -127,5 +127,8 @@ WANTED = {
     folded: ("[m*n]", "[n]{1:}", "[m]"),
     turned: ("[2+arm:n]", "[n]"),
     wait: ("[0<n]", ""),
+    sines: ("[n]",) * 3,
+    quarters: ("[n]",) * 3,
+    angles: ("[n]",) * 3,
 }
 ENTRIES = [Entry(kernel, kinds, WANTED.get(kernel, ())) for kernel, kinds in KINDS.items()]
