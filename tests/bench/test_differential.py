@@ -18,6 +18,7 @@ from differential.report import Tally, show
 from differential.robots import all_robots, shares
 
 import kin
+from kin.kernels import ahead
 
 ROBOTS = all_robots()
 NUMBERS = range(len(KINDS))
@@ -213,6 +214,8 @@ def changed_tree(folder):
     for entry in Path(kin.__file__).parent.iterdir():
         if entry.name not in ("__init__.py", "__pycache__"):
             (folder / "kin" / entry.name).symlink_to(entry)
+    kernels = ahead._file()
+    (folder / "kin" / kernels.name).symlink_to(kernels)
     change = (
         "_solve = solve_ik\n"
         "def solve_ik(*arguments, **options):\n"
