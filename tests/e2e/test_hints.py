@@ -190,9 +190,9 @@ def test_cover_ends_after_a_minute_in_any_case(browser: Browser, address: str) -
     page.add_init_script(silent)
     page.clock.install()
     page.goto(address + "viewer/")
-    page.clock.fast_forward(59_000)
+    page.clock.fast_forward(30_000)
     expect(page.locator("html")).to_have_attribute("data-kb-cover", "light")
-    page.clock.fast_forward(2_000)
+    page.clock.fast_forward(31_000)
     expect(page.locator("html")).not_to_have_attribute("data-kb-cover", "light")
     page.close()
 
