@@ -47,6 +47,7 @@ Store = Callable[[Array, Array, int, Array], None]
 # Of params, T, value, seed, lower, upper, arcs, out: gap in metres, and number of arcs, −1 if nothing is free.
 Careful = Callable[[Array, Array, float, Array, Array, Array, Array, Array], tuple[float, int]]
 Entries = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
+Vector = tuple[float, float, float]
 
 
 @joined
@@ -257,13 +258,22 @@ def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
 
 
 @inlined
-def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, float, bool]:
-    """The elbow of a planar arm of links a, b that ends in (x, y): c, s ≥ 0, 1/D²; c is NaN if it does not close.
+def shoulder_of(wx: float, wy: float, beside: float) -> tuple[float, float]:
+    """X ≥ 0 and 1/r² of a point at (±X, beside), r from the axis of that frame; X is NaN if r is too small."""
+    r2 = wx * wx + wy * wy
+    r, apart = math.sqrt(r2), abs(beside)
+    square = (r - apart) * (r + apart)
+    x = math.sqrt(square if square > 0.0 else 0.0)
+    return math.nan if r + BEYOND < apart else x, 1.0 / r2
+
+
+@inlined
+def elbow_of(D2: float, a: float, b: float) -> tuple[float, float, float, bool]:
+    """The elbow of links a, b whose ends are √D2 apart: c, s ≥ 0, 1/D2; c is NaN if it does not close.
 
     The last is whether it is so nearly straight or folded, closing or not, or ends so near to the first axis, that
     it needs the careful kernel. See :func:`kin.solvers.planar.two_links`.
     """
-    D2 = x * x + y * y
     most, least = a + b, abs(a - b)
     far, near_by = most * most - D2, D2 - least * least
     far = far if far > 0.0 else 0.0
@@ -277,6 +287,22 @@ def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, floa
     c = 0.5 * half * (near_by - far)
     close = (far < _STRAIGHT * near_by) | (near_by < _STRAIGHT * far) | (1e-8 * most * most > D2)
     return c if reached else math.nan, s, 1.0 / D2, close & nearly_reached
+
+
+@inlined
+def zyz_pairs(
+    S: Array, first: int, step: int, pairs: int, b: int, x: Vector, y: Vector, cosine: float
+) -> float:  # fmt: skip
+    """The pairs of A, B, C, rows first, first + step, first + 2 step of S, of ``Rz(A) Ry(B) Rz(C)``; sin B ≥ 0.
+
+    x, y: the first two rows of that rotation; cosine: cos B.
+    """
+    sine = math.sqrt(x[2] * x[2] + y[2] * y[2])
+    S[first, b], S[pairs + first, b] = y[2], x[2]
+    S[first + step, b], S[pairs + first + step, b] = sine, cosine
+    third = first + 2 * step
+    S[third, b], S[pairs + third, b] = x[2] * y[0] - y[2] * x[0], x[2] * y[1] - y[2] * x[1]
+    return sine
 
 
 @inlined

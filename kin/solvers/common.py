@@ -29,14 +29,7 @@ UNBOUNDED = 1e6  # of a limit that never binds
 NEAR, LOW, HIGH = range(3)  # rows of a box: seed and joint limits
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
-_MERGE = TOLERANCES.merge
 _INSET = TOLERANCES.interval_inset
-
-
-@jit
-def merged(angle: float) -> float:
-    """0.0 for an angle below `TOLERANCES.merge`, which is rounding error under the root of a double solution."""
-    return 0.0 if angle < _MERGE else angle
 
 
 @jit

@@ -200,7 +200,7 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
         c, s = cosine * inverse, sine * inverse
         x, y, z = in_base(k, S, 3, i)
         cx, cy = x + k[3] - t[3] * c + t[7] * s, y + k[7] - t[3] * s - t[7] * c
-        c2, s2, scale, close = elbow_of(cx, cy, a, b)
+        c2, s2, scale, close = elbow_of(cx * cx + cy * cy, a, b)
         S[_BEND, i], S[_PAIRS + _BEND, i] = s2, c2
         S[_SUM, i], S[_PAIRS + _SUM, i] = sine, cosine
         A, B = a + b * c2, b * s2

@@ -13,7 +13,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
-from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, many, one, rows_of
+from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, many, one, rows_of, zyz_pairs
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.collinear7.branches import SLACK, solve
 from kin.tolerances import TOLERANCES
@@ -52,10 +52,7 @@ def _shoulder(c: float, s: float, M: Entries, lengths: tuple[float, float], firs
     f0, g0, _ = _column(c, s, c3, s3, c4, s4, M[0], M[4], M[8])
     f1, g1, _ = _column(c, s, c3, s3, c4, s4, M[1], M[5], M[9])
     f2, g2, q2 = _column(c, s, c3, s3, c4, s4, M[2], M[6], M[10])
-    tilt = math.sqrt(f2 * f2 + g2 * g2)
-    S[first + 6, b], S[_PAIRS + first + 6, b] = g2, f2
-    S[first + 8, b], S[_PAIRS + first + 8, b] = tilt, q2
-    S[first + 10, b], S[_PAIRS + first + 10, b] = (f2 * g0 - g2 * f0) / tilt, (f2 * g1 - g2 * f1) / tilt
+    tilt = zyz_pairs(S, first + 6, 2, _PAIRS, b, (f0, f1, f2), (g0, g1, g2), q2)
     return (side < 1e-11 * d5) | (tilt < _SINGULAR)
 
 

@@ -18,7 +18,6 @@ from kin.solvers.common import (
     clear,
     copy_row,
     lay_probes,
-    merged,
     misfit_of,
     split_sum,
     zyz,
@@ -49,7 +48,8 @@ def _azimuths(arm: Array, M: Array, box: Array) -> tuple[float, float, float]:
         return box[NEAR, 0] + box[NEAR, 1] + 0.5 * math.pi, 0.0, 0.0
     if abs(k) - h > arm[SLACK]:
         return 0.0, 0.0, abs(k) - h
-    return math.atan2(y, x), merged(math.atan2(math.sqrt(max((h - k) * (h + k), 0.0)), k)), 0.0
+    spread = math.atan2(math.sqrt(max((h - k) * (h + k), 0.0)), k)
+    return math.atan2(y, x), spread if spread >= _MERGE else 0.0, 0.0
 
 
 @jit

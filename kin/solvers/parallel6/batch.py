@@ -1,17 +1,14 @@
 """The kernels in lanes: all branches of targets that are not singular, see :mod:`kin.solvers.blocks`.
 
-Rows of S are of the shoulders (left, right) θ1, θ5, θ6 and A, of the four pairs of shoulder and wrist θ3, of the
+Rows of S are of the shoulders (left, right) θ1, A, θ5 and θ6, of the four pairs of shoulder and wrist θ3, of the
 eight branches θ2. The other elbow is −θ3, the other wrist −θ5 and half a turn on in θ6 and A; θ4 is what A leaves.
 """
 
 from __future__ import annotations
 
-import math
-
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.solvers.blocks import (
-    BEYOND,
     NEARLY,
     OWN,
     Arc,
@@ -22,9 +19,11 @@ from kin.solvers.blocks import (
     many,
     one,
     rows_of,
+    shoulder_of,
     single,
     solved,
     solved_many,
+    zyz_pairs,
 )
 from kin.solvers.parallel6.branches import solve
 from kin.solvers.parallel6.geometry import (
@@ -46,7 +45,7 @@ from kin.transforms import Array
 
 _SINGULAR = TOLERANCES.singular
 
-_FRONT, _TILT, _SPIN, _SUM, _BEND, _UPPER, _END = (OWN + i for i in (0, 2, 4, 6, 8, 12, 20))
+_FRONT, _SUM, _TILT, _SPIN, _BEND, _UPPER, _END = (OWN + i for i in (0, 2, 4, 6, 8, 12, 20))
 _PAIRS, _ROWS = _END - OWN, _END + _END - OWN + 1
 _REST = _PAIRS + _UPPER  # θ4
 _CLOSE = 1e-3  # of the lengths: how far apart two shoulders are that the careful kernel computes
@@ -61,7 +60,7 @@ def _arm(
     links: a2, a3 and the sign of θ3 with the elbow up.
     """
     a2, a3, side = links
-    c3, s3, scale, close = elbow_of(px, py, a2, a3)
+    c3, s3, scale, close = elbow_of(px * px + py * py, a2, a3)
     s3 = side * s3
     S[_BEND + pair, b], S[_PAIRS + _BEND + pair, b] = s3, c3
     A, B = a2 + a3 * c3, a3 * s3
@@ -84,14 +83,10 @@ def _shoulder(
     v0, v1, v2 = c1 * r10 - s1 * r00, c1 * r11 - s1 * r01, c1 * r12 - s1 * r02
     m00, m01, m02 = c1 * r00 + s1 * r10, c1 * r01 + s1 * r11, c1 * r02 + s1 * r12
     m10, m11, m12, m22 = ca * v0 + sa * r20, ca * v1 + sa * r21, ca * v2 + sa * r22, ca * r22 - sa * v2
-    square = m02 * m02 + m12 * m12
-    sine = math.sqrt(square)
-    inverse = sine / square
-    cA, sA = m02 * inverse, m12 * inverse
     S[_FRONT + si, b], S[_PAIRS + _FRONT + si, b] = s1, c1
-    S[_TILT + si, b], S[_PAIRS + _TILT + si, b] = sine, m22
-    S[_SPIN + si, b], S[_PAIRS + _SPIN + si, b] = cA * m10 - sA * m00, cA * m11 - sA * m01
-    S[_SUM + si, b], S[_PAIRS + _SUM + si, b] = m12, m02
+    sine = zyz_pairs(S, _SUM + si, 2, _PAIRS, b, (m00, m01, m02), (m10, m11, m12), m22)
+    inverse = 1.0 / sine
+    cA, sA = m02 * inverse, m12 * inverse
     u, v, p, q = x - a1, ca * y + sa * wz, a4 * cA - d5 * sA, a4 * sA + d5 * cA
     links = (a2, a3, side)
     close0 = _arm(u - p, v - q, links, S, 2 * si, 4 * si, b)
@@ -112,16 +107,11 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
         M = canonical_of(base, tool, S, b)
         wx, wy, wz = M[3], M[7], M[11]
         y = (ca * wz - beside) * inverse_sa
-        r2 = wx * wx + wy * wy
-        r, apart = math.sqrt(r2), abs(y)
-        square = (r - apart) * (r + apart)
-        root = math.sqrt(square if square > 0.0 else 0.0)
-        root = math.nan if r + BEYOND < apart else root
-        scale = 1.0 / r2
+        root, scale = shoulder_of(wx, wy, y)
         x = left * root
         close0 = _shoulder(M, (x, y, scale), left, lengths, S, 0, b)
         close1 = _shoulder(M, (-x, y, scale), -left, lengths, S, 1, b)
-        marked = close0 | close1 | (root < _CLOSE * (apart + abs(a4) + abs(d5)) + _SINGULAR)
+        marked = close0 | close1 | (root < _CLOSE * (abs(y) + abs(a4) + abs(d5)) + _SINGULAR)
         S[-1, b] = 1.0 if marked else 0.0
         found += 1 if marked else 0
     return found
@@ -131,12 +121,12 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
 def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
     widest()
-    single(arc, S, _FRONT, _TILT, _PAIRS, count, params[SIGN], params[OFFSET])
+    single(arc, S, _FRONT, _SUM, _PAIRS, count, params[SIGN], params[OFFSET])
     double(arc, S, _TILT, _SPIN, _PAIRS, count, params[SIGN + 4], params[OFFSET + 4], False)
-    double(arc, S, _SPIN, _SUM, _PAIRS, count, params[SIGN + 5], params[OFFSET + 5], True)
+    double(arc, S, _SPIN, _BEND, _PAIRS, count, params[SIGN + 5], params[OFFSET + 5], True)
     # A as joint 4 would have it with joints 2 and 3 at 0.
     total = params[OFFSET + 1] + params[OFFSET + 2] + params[OFFSET + 3]
-    double(arc, S, _SUM, _BEND, _PAIRS, count, params[SIGN + 3], total, True)
+    double(arc, S, _SUM, _TILT, _PAIRS, count, params[SIGN + 3], total, True)
     double(arc, S, _BEND, _UPPER, _PAIRS, count, params[SIGN + 2], params[OFFSET + 2], False)
     single(arc, S, _UPPER, _END, _PAIRS, count, params[SIGN + 1], params[OFFSET + 1])
     sense2, sense3 = params[SIGN + 3] * params[SIGN + 1], params[SIGN + 3] * params[SIGN + 2]

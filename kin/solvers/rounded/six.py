@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from kin.angles import apart
 from kin.axes import size
+from kin.differential.error import task_error
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.contract import POSE, ClosedForm, Completeness
@@ -161,10 +162,7 @@ class SixJoints:
 
     def _errors(self, T: Array, q: Array) -> Array:
         """Twists ``(k, 6)`` that would bring the tool from where it is onto the target, lengths in arm sizes."""
-        at = fk(self.robot, q)
-        back = at[:, :3, :3] @ T[:3, :3].T  # the rotation that is left, turned round
-        turn = 0.5 * np.stack([back[:, b, c] - back[:, c, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1)
-        return np.concatenate([(T[:3, 3] - at[:, :3, 3]) / self.size, turn], axis=1)
+        return np.asarray(task_error(self.robot, q, T, "pose") / np.repeat([self.size, 1.0], 3))
 
     def _newton(self, T: Array, q: Array) -> tuple[Array, Flags]:
         """Newton's method without damping from rows ``(k, 6)``, and which it brings onto the target close by.

@@ -13,50 +13,36 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import WIDE, sin_cos, widest
-from kin.solvers.blocks import OWN, VALUE, Arc, Entries, double, in_base, many, one, rows_of
+from kin.solvers.blocks import (
+    OWN,
+    VALUE,
+    Arc,
+    Entries,
+    Vector,
+    canonical_of,
+    double,
+    elbow_of,
+    many,
+    one,
+    rows_of,
+    zyz_pairs,
+)
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.common import shifted
 from kin.solvers.srs7.branches import solve
-from kin.solvers.srs7.geometry import REACH, radial_of
+from kin.solvers.srs7.geometry import radial_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 # Rows of a block: OWN + i is y of θ(i + 1), _END + i is x of it, for i < _PAIRS.
 _PAIRS, _END, _ROWS = 7, OWN + 7, OWN + 15
 _SINGULAR = TOLERANCES.singular
-Vector = tuple[float, float, float]
+_STRAIGHT = 2e-7  # sine of θ4: of two elbows that differ by less, the careful kernel makes one
 
 
 @inlined
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def _wrist_centre(u: Vector, v: Vector, w: Vector, p: Vector, base: Entries, tool: Entries) -> Vector:
-    """The translation of base⁻¹ · T · tool⁻¹, with u, v, w, p the columns of T turned by base⁻¹."""
-    x, y, z = tool[3], tool[7], tool[11]
-    return (
-        u[0] * x + v[0] * y + w[0] * z + (p[0] + base[3]),
-        u[1] * x + v[1] * y + w[1] * z + (p[1] + base[7]),
-        u[2] * x + v[2] * y + w[2] * z + (p[2] + base[11]),
-    )
-
-
-@inlined
-def _elbow(W: Vector, d3: float, d5: float) -> tuple[float, float, float, bool, bool]:
-    """cos θ4, sin θ4 ≥ 0, 1/L, whether W is out of reach (cos θ4 is NaN then), whether the arm is straight."""
-    most, least = d3 + d5, abs(d3 - d5)
-    nearest = max(least - REACH, 1e-12)
-    half = 0.5 / (d3 * d5)
-    L2 = W[0] * W[0] + W[1] * W[1] + W[2] * W[2]
-    far, near = most * most - L2, L2 - least * least
-    far = far if far > 0.0 else 0.0
-    near = near if near > 0.0 else 0.0
-    lost = ((most + REACH) ** 2 < L2) | (nearest * nearest > L2)
-    s4 = half * math.sqrt(far * near)
-    c4 = math.nan if lost else 0.5 * half * (near - far)
-    return c4, s4, 1.0 / math.sqrt(L2), lost, far < 1e-14 * near
 
 
 @inlined
@@ -81,26 +67,13 @@ def _arm_angle(value: float, r: Vector, e1: Vector, e2: Vector) -> tuple[float, 
 
 
 @inlined
-def _zyz_pairs(x: Vector, y: Vector, first: int, b: int, S: Array) -> bool:
-    """Pairs (y, x) of A, B, C from the first two rows of Rz(A) Ry(B) Rz(C); whether sin B vanishes.
-
-    The x of B, cos B, is written by the caller.
-    """
-    h = math.sqrt(x[2] * x[2] + y[2] * y[2])
-    c, s = x[2] / h, y[2] / h
-    S[OWN + first, b], S[_END + first, b] = y[2], x[2]
-    S[OWN + first + 1, b] = h
-    S[OWN + first + 2, b], S[_END + first + 2, b] = c * y[0] - s * x[0], c * y[1] - s * x[1]
-    return h < _SINGULAR
-
-
-@inlined
 def _shoulder(W: Vector, r: Vector, lengths: tuple[float, float], b: int, S: Array) -> tuple[
     Vector, Vector, Vector, float, float, bool, bool
 ]:  # fmt: skip
     """x3, y3, z3, cos θ4, sin θ4, whether W is out of reach, whether the pose is singular; pairs of θ1 … θ4."""
     d3, d5 = lengths
-    c4, s4, inverse_L, lost, straight = _elbow(W, d3, d5)
+    c4, s4, scale, _ = elbow_of(_dot(W, W), d3, d5)
+    inverse_L, lost, straight = math.sqrt(scale), c4 != c4, s4 < _STRAIGHT
     along, rho = (d3 + d5 * c4) * inverse_L, d5 * s4 * inverse_L
     u = (W[0] * inverse_L, W[1] * inverse_L, W[2] * inverse_L)
     e1, e2, h = _frame(u)
@@ -109,10 +82,19 @@ def _shoulder(W: Vector, r: Vector, lengths: tuple[float, float], b: int, S: Arr
     x = (rho * u[0] - along * q[0], rho * u[1] - along * q[1], rho * u[2] - along * q[2])
     y = (s * e1[0] - c * e2[0], s * e1[1] - c * e2[1], s * h)
     z = (along * u[0] + rho * q[0], along * u[1] + rho * q[1], along * u[2] + rho * q[2])
-    singular = _zyz_pairs((x[0], y[0], z[0]), (x[1], y[1], z[1]), 0, b, S)
-    S[_END + 1, b] = z[2]
+    sine = zyz_pairs(S, OWN, 1, _PAIRS, b, (x[0], y[0], z[0]), (x[1], y[1], z[1]), z[2])
     S[OWN + 3, b], S[_END + 3, b] = s4, c4
-    return x, y, z, c4, s4, lost, singular | straight | (h < 1e-12) | no_side
+    return x, y, z, c4, s4, lost, (sine < _SINGULAR) | straight | (h < 1e-12) | no_side
+
+
+@inlined
+def _seen(v: Vector, M: Entries) -> Vector:
+    """The columns of the target's rotation, along v."""
+    return (
+        v[0] * M[0] + v[1] * M[4] + v[2] * M[8],
+        v[0] * M[1] + v[1] * M[5] + v[2] * M[9],
+        v[0] * M[2] + v[1] * M[6] + v[2] * M[10],
+    )
 
 
 @inlined
@@ -123,22 +105,15 @@ def _pairs(arm: Array, near: Array, count: int, S: Array) -> int:
     """
     lengths = arm[UPPER_ARM], arm[FOREARM]
     base, tool = rows_of(arm, BASE), rows_of(arm, TOOL)
-    t0, t1, t2 = (tool[0], tool[4], tool[8]), (tool[1], tool[5], tool[9]), (tool[2], tool[6], tool[10])
     r = _seed_direction(arm, near, count, S)
     found = 0
     for b in range(count):
-        u, v, w = in_base(base, S, 0, b), in_base(base, S, 1, b), in_base(base, S, 2, b)
-        W = _wrist_centre(u, v, w, in_base(base, S, 3, b), base, tool)
-        x, y, z, c4, s4, lost, singular = _shoulder(W, r, lengths, b, S)
-        # R47 = R04ᵀ R; tool⁻¹, the last factor of R, is multiplied last.
-        f = (c4 * x[0] - s4 * z[0], c4 * x[1] - s4 * z[1], c4 * x[2] - s4 * z[2])
-        g = (s4 * x[0] + c4 * z[0], s4 * x[1] + c4 * z[1], s4 * x[2] + c4 * z[2])
-        f = (_dot(f, u), _dot(f, v), _dot(f, w))
-        y = (_dot(y, u), _dot(y, v), _dot(y, w))
-        g = (_dot(g, u), _dot(g, v), _dot(g, w))
-        x_row, y_row = (_dot(f, t0), _dot(f, t1), _dot(f, t2)), (_dot(y, t0), _dot(y, t1), _dot(y, t2))
-        aligned = _zyz_pairs(x_row, y_row, 4, b, S)
-        S[_END + 5, b] = _dot(g, t2)
+        M = canonical_of(base, tool, S, b)
+        x, y, z, c4, s4, lost, singular = _shoulder((M[3], M[7], M[11]), r, lengths, b, S)
+        # R47 = R04ᵀ R, but for the first two entries of its third row.
+        f = _seen((c4 * x[0] - s4 * z[0], c4 * x[1] - s4 * z[1], c4 * x[2] - s4 * z[2]), M)
+        cosine = (s4 * x[0] + c4 * z[0]) * M[2] + (s4 * x[1] + c4 * z[1]) * M[6] + (s4 * x[2] + c4 * z[2]) * M[10]
+        aligned = zyz_pairs(S, OWN + 4, 1, _PAIRS, b, f, _seen(y, M), cosine) < _SINGULAR
         special = (singular | aligned) & (not lost)
         S[-1, b] = 1.0 if special else 0.0
         found += 1 if special else 0

@@ -12,7 +12,8 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_pose
-from kin.solvers.common import HIGH, LOW, NEAR, merged, shifted, zyz
+from kin.solvers.common import HIGH, LOW, NEAR, shifted, zyz
+from kin.solvers.planar import two_links
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -36,13 +37,9 @@ def triangle_of(arm: Array, M: Array, triangle: Array) -> tuple[int, float]:
     d3, d5 = arm[UPPER_ARM], arm[FOREARM]
     x, y, z = M[0, 3], M[1, 3], M[2, 3]
     L = math.sqrt(x * x + y * y + z * z)
-    far = (d3 + d5) ** 2 - L * L
-    near = L * L - (d3 - d5) ** 2
-    if L - (d3 + d5) > REACH:
-        return TOO_FAR, L - (d3 + d5)
-    if abs(d3 - d5) - L > REACH or L < 1e-12:
-        return TOO_NEAR, abs(d3 - d5) - L
-    bend = merged(2.0 * math.atan2(math.sqrt(max(far, 0.0)), math.sqrt(max(near, 0.0))))
+    miss, bend, _, k1, k2 = two_links(L, 0.0, d3, d5)
+    if miss > REACH or L < 1e-12:
+        return TOO_NEAR if abs(d3 - d5) > L or L < 1e-12 else TOO_FAR, miss
     ux, uy, uz = x / L, y / L, z / L
     h = math.hypot(ux, uy)
     if h > 1e-12:
@@ -53,8 +50,7 @@ def triangle_of(arm: Array, M: Array, triangle: Array) -> tuple[int, float]:
     triangle[U, 0], triangle[U, 1], triangle[U, 2] = ux, uy, uz
     triangle[E1, 0], triangle[E1, 1], triangle[E1, 2] = e2y * uz, -e2x * uz, e2x * uy - e2y * ux
     triangle[E2, 0], triangle[E2, 1], triangle[E2, 2] = e2x, e2y, 0.0
-    triangle[SHAPE, 0] = d3 * (d3 + d5 * math.cos(bend)) / L
-    triangle[SHAPE, 1] = d3 * d5 * math.sin(bend) / L
+    triangle[SHAPE, 0], triangle[SHAPE, 1] = d3 * k1 / L, d3 * k2 / L
     triangle[SHAPE, 2] = bend
     return FITS, 0.0
 

@@ -60,7 +60,7 @@ def _hand(wrist: Pair, elbow: Vector, links: Pair, a: Vector, k: int, b: int, S:
 @inlined
 def _shoulder(wrist: Pair, links: Pair, a: Vector, side: int, b: int, S: Array) -> bool:
     """The pairs of one shoulder side (0 front, 1 back) with either elbow; whether the pose is singular."""
-    c3, s3, scale, aligned = elbow_of(wrist[0], wrist[1], links[0], links[1])
+    c3, s3, scale, aligned = elbow_of(wrist[0] * wrist[0] + wrist[1] * wrist[1], links[0], links[1])
     S[_BEND + side, b], S[_PAIRS + _BEND + side, b] = s3, c3
     up = _hand(wrist, (c3, s3, scale), links, a, 2 * side, b, S)
     down = _hand(wrist, (c3, -s3, scale), links, a, 2 * side + 1, b, S)

@@ -8,10 +8,10 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.kernels.compile import jit
-from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
 from kin.solvers.canonical import canonical_box
-from kin.solvers.common import clear, copy_row, merged
+from kin.solvers.common import clear, copy_row
+from kin.solvers.planar import two_links
 from kin.solvers.wrist5.geometry import A1, A2, D4, D6, OFFSET, REACH, SINGULAR, wrist_angles
 from kin.solvers.wrist5.redundancy import choose_theta1
 from kin.transforms import Array
@@ -29,17 +29,6 @@ def _wrist_centre(arm: Array, T: Array, a: Array) -> tuple[float, float, float]:
     z = arm[8] * T[0, 3] + arm[9] * T[1, 3] + arm[10] * T[2, 3] + arm[11]
     d6 = arm[D6]
     return x - d6 * a[0], y - d6 * a[1], d6 * a[2] - z
-
-
-@jit
-def _elbow(arm: Array, rho: float, h: float) -> tuple[float, float]:
-    """|θ3| of the planar arm that ends in (ρ, h), and the metres by which it does not reach."""
-    a2, d4 = arm[A2], arm[D4]
-    D2 = rho * rho + h * h
-    D = math.sqrt(D2)
-    miss = max(D - (a2 + d4), abs(a2 - d4) - D)
-    far, near = (a2 + d4) ** 2 - D2, D2 - (a2 - d4) ** 2
-    return merged(2.0 * atan2(math.sqrt(max(far, 0.0)), math.sqrt(max(near, 0.0)))), miss
 
 
 @jit
@@ -64,13 +53,11 @@ def solve(
     for side in range(1 if on_axis else 2):
         shoulder = 1.0 if side == 0 else -1.0
         rho = shoulder * r - arm[A1]
-        bend, miss = _elbow(arm, rho, h)
+        miss, bend, _, k1, k2 = two_links(rho, h, arm[A2], arm[D4])
         gap = min(gap, miss)
         if miss > REACH:
             continue
-        azimuth, climb = atan2(shoulder * wy, shoulder * wx), atan2(h, rho)
-        sine, cosine = sine_cosine(bend)
-        spread = atan2(arm[D4] * sine, arm[A2] + arm[D4] * cosine)
+        azimuth, climb, spread = atan2(shoulder * wy, shoulder * wx), atan2(h, rho), atan2(k2, k1)
         for i in range(4 if bend > 0.0 else 2):
             branch = 4 * side + i
             row = out[branch]

@@ -6,13 +6,11 @@ Rows of S are θ1 (front, back), θ3 (front, back), and of the four arms (front 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
 from kin.solvers.blocks import (
-    BEYOND,
     NEARLY,
     OWN,
     Arc,
@@ -23,9 +21,11 @@ from kin.solvers.blocks import (
     many,
     one,
     rows_of,
+    shoulder_of,
     single,
     solved,
     solved_many,
+    zyz_pairs,
 )
 from kin.solvers.wrist6.branches import Rotation, solve
 from kin.solvers.wrist6.geometry import (
@@ -57,17 +57,6 @@ def shape_of(params: Array) -> tuple[float, float, float, float, Twist]:
     """a1, a2, f, L, and how axis 4 is turned against the line from axis 3 to W: see the layout of params."""
     p = params
     return p[A1], p[A2], p[F], p[BESIDE], (p[COS_PHASE], p[SIN_PHASE], p[COS_TWIST], p[SIN_TWIST])
-
-
-@inlined
-def shoulder(wx: float, wy: float, beside: float) -> tuple[float, float, bool]:
-    """X of the shoulder in front, NaN if W is too near to axis 1; 1/r²; whether it needs the careful kernel."""
-    r2 = wx * wx + wy * wy
-    r, apart = math.sqrt(r2), abs(beside)
-    square = (r - apart) * (r + apart)
-    x = math.sqrt(square if square > 0.0 else 0.0)
-    x = math.nan if r + BEYOND < apart else x
-    return x, 1.0 / r2, x < _CLOSE * apart + NEARLY
 
 
 @inlined
@@ -104,10 +93,7 @@ def arm_pairs(
     v0, v1, v2 = -s * x0 - g * z0, -s * x1 - g * z1, -s * x2 - g * z2
     m00, m01, m02 = g * x0 - s * z0, g * x1 - s * z1, g * x2 - s * z2
     m10, m11, m12, m22 = ca * v0 + sa * y0, ca * v1 + sa * y1, ca * v2 + sa * y2, ca * y2 - sa * v2
-    sine = math.sqrt(m02 * m02 + m12 * m12)
-    S[_ROLL + arm, b], S[PAIRS + _ROLL + arm, b] = m12, m02
-    S[_TILT + arm, b], S[PAIRS + _TILT + arm, b] = sine, m22
-    S[_SPIN + arm, b], S[PAIRS + _SPIN + arm, b] = m02 * m10 - m12 * m00, m02 * m11 - m12 * m01
+    sine = zyz_pairs(S, _ROLL + arm, 4, PAIRS, b, (m00, m01, m02), (m10, m11, m12), m22)
     return sine < NEARLY
 
 
@@ -119,7 +105,7 @@ def _side(
     a1, a2, f, beside = lengths
     s1, c1, R = turned(M, X, beside, scale)
     x, h = X - a1, -M[11]
-    c3, s3, inverse_D2, close0 = elbow_of(x, h, a2, f)
+    c3, s3, inverse_D2, close0 = elbow_of(x * x + h * h, a2, f)
     s3 = -s3 if back else s3
     S[FRONT + back, b], S[PAIRS + FRONT + back, b] = s1, c1 + 0.0 * c3
     S[BEND + back, b], S[PAIRS + BEND + back, b] = s3, c3
@@ -141,10 +127,11 @@ def both_sides(side: Side, params: Array, count: int, S: Array) -> int:
     found = 0
     for b in range(count):
         M = canonical_of(base, tool, S, b)
-        X, scale, close = shoulder(M[3], M[7], beside)
+        X, scale = shoulder_of(M[3], M[7], beside)
+        margin = X - _CLOSE * abs(beside)
         close0 = side(M, X, scale, lengths, twist, S, 0, b)
         close1 = side(M, -X, scale, lengths, twist, S, 1, b)
-        marked = close | close0 | close1
+        marked = (margin < NEARLY) | close0 | close1
         S[-1, b] = 1.0 if marked else 0.0
         found += 1 if marked else 0
     return found
