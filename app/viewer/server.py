@@ -41,7 +41,6 @@ from app.viewer.viser_patches import (
     cache_type_hints,
     keep_sent_values,
     log_what_viser_prints,
-    set_events_in_their_loop,
 )
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
 
@@ -102,7 +101,6 @@ class ViewerServer:
             raise RuntimeError("the viewer is already running")
         cache_type_hints()
         log_what_viser_prints()
-        set_events_in_their_loop()
         keep_sent_values()
         server, self._connections = start_viser(loop, label="Kinboard")
         self._server = server

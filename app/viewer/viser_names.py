@@ -48,7 +48,7 @@ SERVER = PrivateUse(
 OUTBOX = PrivateUse(
     "viser",
     "One frame and one wake-up of the event loop for all messages of a step.",
-    "viser's own buffer sends the messages: drags take about twice as long.",
+    "viser's own buffer sends the messages: drags take about twice as long, and a connection may be lost.",
     (
         f"{_BUFFER}.event_loop",
         f"{_BUFFER}.message_event",
@@ -147,12 +147,6 @@ GIZMOS = PrivateUse(
         f"{_SCENE}:_TransformControlsState(last_updated, update_cb, sync_cb)",
     ),
 )
-WAKE_UPS = PrivateUse(
-    "viser",
-    "Wake-ups of a buffer's reader on the event loop's own thread.",
-    "Now and then a visitor's connection may be lost; the page connects again.",
-    (f"{_BUFFER}.message_event",),
-)
 TYPE_HINTS = PrivateUse(
     "viser",
     "The type hints of a class are evaluated once, not for each of its objects.",
@@ -168,6 +162,6 @@ CALLBACK_ERRORS = PrivateUse(
 )
 
 ALL = (
-    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, MARKS, IDENTITY, FILTER, GIZMOS),
-    *(WAKE_UPS, TYPE_HINTS, CALLBACK_ERRORS),
+    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, MARKS),
+    *(IDENTITY, FILTER, GIZMOS, TYPE_HINTS, CALLBACK_ERRORS),
 )

@@ -22,20 +22,15 @@ are added later. It knows which to show again.
 Log: viser prints what a callback raises, and warns of messages with all that is in them.
 `log_what_viser_prints` logs both.
 
-Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
-visitor's connection was lost. `set_events_in_their_loop` fixes that.
-
 Tests compare these functions with viser's own.
 """
 
 from __future__ import annotations
 
-import asyncio
 import contextvars
 import functools
 import logging
 import sys
-import threading
 import time
 import typing
 import warnings
@@ -47,7 +42,6 @@ import numpy as np
 import viser
 from viser import _messages as messages
 from viser.infra import ClientId
-from viser.infra import _async_message_buffer as buffers
 
 from app.viewer import viser_names
 from kin.transforms import Array
@@ -248,41 +242,6 @@ def keep_private(gizmo: viser.TransformControlsHandle) -> None:
 
 def _floats(values: Array | Sequence[float]) -> list[float]:
     return values.tolist() if isinstance(values, np.ndarray) else list(values)
-
-
-class _LoopEvent(asyncio.Event):
-    """An event that only its loop's thread can set: the thread that creates it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._thread = threading.get_ident()
-
-    def set(self) -> None:
-        """Wakes waiters, but only on the loop's own thread."""
-        if threading.get_ident() == self._thread:
-            super().set()
-
-
-def set_events_in_their_loop() -> None:
-    """Make viser's message buffers wake their readers on the event loop's thread only.
-
-    A message pushed by another thread sets an `asyncio.Event` there, which is unsafe: of two hundred visitors who
-    connected at once, some failed ("deque mutated during iteration") or waited forever. viser also asks the loop
-    to set the event, at once or at the end of an atomic block, so no wake-up is lost.
-    """
-    if not viser_names.WAKE_UPS.is_there:
-        return
-    original = buffers.AsyncMessageBuffer.__init__
-    if getattr(original, "sets_events_in_its_loop", False):
-        return
-
-    @functools.wraps(original)
-    def make(self: buffers.AsyncMessageBuffer, *args: Any, **kwargs: Any) -> None:
-        original(self, *args, **kwargs)
-        self.message_event = _LoopEvent()
-
-    make.sets_events_in_its_loop = True  # type: ignore[attr-defined]
-    buffers.AsyncMessageBuffer.__init__ = make  # type: ignore[method-assign]
 
 
 def log_what_viser_prints() -> None:

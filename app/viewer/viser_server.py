@@ -69,7 +69,6 @@ class PortlessServer(infra.WebsockServer):
         asyncio.run_coroutine_threadsafe(self._prepare(), self._loop).result()
 
     async def _prepare(self) -> None:
-        # Its events must belong to the loop's thread: see `viser_patches.set_events_in_their_loop`.
         self._broadcast_buffer = AsyncMessageBuffer(self._loop, persistent_messages=True)
         self._stopping = self._loop.create_future()
         self._all_ended = asyncio.Event()

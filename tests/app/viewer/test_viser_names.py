@@ -15,7 +15,6 @@ import pytest
 import viser
 from private_names import asked_again, leave_out, take_away
 from test_viser_server import CAMERA, Visit, loop, serve, server  # noqa: F401 - fixtures
-from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.viewer import viser_names, viser_server
 from app.viewer.viser_outbox import in_one_frame
@@ -26,7 +25,6 @@ from app.viewer.viser_patches import (
     is_removed,
     keep_sent_values,
     sent_value,
-    set_events_in_their_loop,
     show_text,
     show_value,
     uuid_of,
@@ -149,18 +147,12 @@ def test_without_the_private_names_of_controls_viser_s_setters_show_values(
 
 
 def test_without_the_names_of_what_is_patched_nothing_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (
-        "viser:GuiApi._handle_gui_updates",
-        "viser._assignable_props_api:get_type_hints",
-        "viser.infra._async_message_buffer:AsyncMessageBuffer.message_event",
-    ):
+    for name in ("viser:GuiApi._handle_gui_updates", "viser._assignable_props_api:get_type_hints"):
         take_away(monkeypatch, name)
-    for use in (viser_names.SENT_VALUES, viser_names.TYPE_HINTS, viser_names.WAKE_UPS):
+    for use in (viser_names.SENT_VALUES, viser_names.TYPE_HINTS):
         asked_again(monkeypatch, use)
-    before = AsyncMessageBuffer.__init__
-    for patch in (keep_sent_values, cache_type_hints, set_events_in_their_loop):
+    for patch in (keep_sent_values, cache_type_hints):
         patch()
     assert not hasattr(viser.GuiApi, "_handle_gui_updates")
-    assert AsyncMessageBuffer.__init__ is before
     shown = SimpleNamespace(target=SimpleNamespace(value=2.5))
     assert sent_value(shown) == 2.5

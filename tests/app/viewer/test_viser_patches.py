@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import io
-import threading
 import typing
 
 import numpy as np
@@ -13,8 +12,7 @@ import pytest
 import viser
 from bare_page import state_of
 from viser import _assignable_props_api as props
-from viser._messages import GuiUpdateMessage, SetPositionMessage, TransformControlsUpdateMessage
-from viser.infra import _async_message_buffer as buffers
+from viser._messages import GuiUpdateMessage, TransformControlsUpdateMessage
 
 from app.viewer.viser_patches import (
     SceneFilter,
@@ -23,7 +21,6 @@ from app.viewer.viser_patches import (
     keep_private,
     keep_sent_values,
     sent_value,
-    set_events_in_their_loop,
     show_text,
     show_value,
 )
@@ -172,37 +169,6 @@ def test_hints_are_looked_up_once_and_are_the_same(wire, monkeypatch):
     assert first.axes_length == 0.25
     with pytest.raises(AttributeError):
         _ = first.no_such_thing
-
-
-def test_messages_of_other_threads_wake_the_reader_in_its_own(monkeypatch):
-    """Viser's own event would be set, and its waiters woken, by the thread that pushes."""
-    monkeypatch.setattr(buffers.AsyncMessageBuffer, "__init__", buffers.AsyncMessageBuffer.__init__)
-    set_events_in_their_loop()
-    set_events_in_their_loop()  # once is enough
-    woken, count = [], 3000
-
-    async def read():
-        buffer = buffers.AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=False)
-        buffer.window_duration_sec = 0.0
-        assert type(buffer.message_event) is not asyncio.Event
-        wake = asyncio.Event.set
-        monkeypatch.setattr(asyncio.Event, "set", lambda event: (woken.append(threading.get_ident()), wake(event)))
-
-        def push():
-            for k in range(count):
-                buffer.push(SetPositionMessage(f"/{k}", PLACE))
-
-        pushing = threading.Thread(target=push)
-        pushing.start()
-        seen = 0
-        async for window in buffer.window_generator(0):
-            seen += len(window)
-            if seen == count:
-                break
-        pushing.join()
-
-    asyncio.run(asyncio.wait_for(read(), 20))
-    assert set(woken) == {threading.get_ident()}
 
 
 def seen_at_the_top(messages) -> dict[str, bool]:
