@@ -16,6 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 from fastapi.testclient import TestClient
+from lesson_arms import arms_of
 from versions import needs_ompl
 
 import kin
@@ -246,7 +247,7 @@ def test_every_lesson_has_its_section():
 def test_each_part_of_a_goal_has_steps_that_ask_for_it():
     asked, goals = {}, {}
     for lesson in LESSONS:
-        outlines = [lesson.outline(kin.get_robot(name), Units()) for name in ("puma560", "planar2r", "iiwa14")]
+        outlines = [lesson.asked(robot, Units()) for robot in arms_of(lesson.key)]
         asked[lesson.title] = {step.title for outline in outlines for step in outline.steps if step.question}
         goals[lesson.title] = outlines[0].goal
     seen, title = dict.fromkeys(goals, ""), ""

@@ -5,6 +5,7 @@ beside the file (`facts_of`), or names that the file declares, each with a sente
 reads the file without running the lesson. Questions are those of exercises, with the same fields::
 
     goal = "You can …"
+    arms = ["pioneer5", "puma560"]
 
     [facts]
     speed = "of the tool point while joint 1 moves by itself, m/s"
@@ -17,7 +18,7 @@ reads the file without running the lesson. Questions are those of exercises, wit
     end = "moved"
     figure = "speeds"
     drawn = { pose = "moved", joint = 1 }
-    arm = { when = "not turns(1)", id = "ur5" }
+    arms = ["ur5"]
 
     [steps.estimate]
     kind = "choice"
@@ -34,9 +35,11 @@ a wrong one, with the answer as the value of a joint. Of lengths, it is two poin
 leads from one towards the other, as in ``{ from = "tool", to = "target" }``; with `scale`, so many times as
 long. Or it is a ``shape`` of the lesson's own, such as an ellipsoid, which is drawn with the answer in its place.
 The options of a choice are drawn as what its `leads` name: directions, poses of the arm, ways and frames of the
-lesson's own. `answered` is a figure of the last answer. What is `withheld` is nowhere to be seen before. `arm`
-is one of the library that shows what this one cannot; a button changes to it. An `estimate` is asked before the
-question: it is a choice that looking answers.
+lesson's own. `answered` is a figure of the last answer. What is `withheld` is nowhere to be seen before. An
+`estimate` is asked before the question: it is a choice that looking answers.
+
+The questions are about one of the `arms` of the library that the file names; a step about an idea that these do
+not show names its own.
 
 An `example` is worked on an arm of its own: :mod:`app.exercises.worked`.
 
@@ -110,7 +113,7 @@ class StepText:
         estimate: what is asked before, as `questions`.
         drawn: how an answer is drawn: a joint value as the pose that has it, with the number of the joint; a
             length as a bar; or the shape of this name.
-        arm: when another arm is offered, and its id.
+        arms: ids of the arms that it is asked about; empty: those of the lesson.
         answered: the name of a figure of the answer.
     """
 
@@ -125,7 +128,7 @@ class StepText:
     end: str
     figure: str
     drawn: tuple[str, int] | BarText | str | None
-    arm: tuple[Expression, str] | None
+    arms: tuple[str, ...]
     answered: str = _NONE
 
 
@@ -135,6 +138,7 @@ class LessonText:
 
     Attributes:
         file: where it was read, for messages.
+        arms: ids of the arms of the library that it asks about, the usual one first.
         facts: what each fact is, by its name.
         words: names for texts that depend on facts.
         check: each question as alternatives.
@@ -143,11 +147,17 @@ class LessonText:
 
     file: str
     goal: Words
+    arms: tuple[str, ...]
     facts: Mapping[str, str]
     words: Mapping[str, Words]
     steps: tuple[StepText, ...]
     check: tuple[tuple[QuestionText, ...], ...]
     example: WorkedText
+
+    @property
+    def every_arm(self) -> tuple[str, ...]:
+        """The ids of all arms that it asks about."""
+        return tuple(dict.fromkeys([*self.arms, *(arm for step in self.steps for arm in step.arms)]))
 
     @property
     def poses(self) -> frozenset[str]:
@@ -179,7 +189,8 @@ def parse_lesson(text: str, file: str = "lesson", facts: Mapping[str, str] = NO_
     steps = tuple(_step(item) for item in fields.tables("steps", 1))
     check = tuple(_alternatives(item) for item in fields.tables("check", 1))
     example = read_worked(fields.sub("example"))
-    lesson = LessonText(file, fields.words("goal"), facts, words, steps, check, example)
+    arms = _arms(fields, 1)
+    lesson = LessonText(file, fields.words("goal"), arms, facts, words, steps, check, example)
     fields.done()
     known = frozenset(facts) | frozenset(Facts(one := kin.get_robot("ur5"), one.q_home))
     for expression in found:
@@ -236,7 +247,7 @@ def _step(fields: Fields) -> StepText:
         fields.text("end", _NONE),
         fields.text("figure", _NONE),
         _drawn(fields.sub("drawn")) if fields.has("drawn") else None,
-        _arm(fields.sub("arm")) if fields.has("arm") else None,
+        _arms(fields),
         fields.text("answered", _NONE),
     )
     fields.done()
@@ -274,9 +285,11 @@ def _point(fields: Fields, name: str) -> str | tuple[Expression, ...]:
     return at
 
 
-def _arm(fields: Fields) -> tuple[Expression, str]:
-    found = fields.expression("when", "1"), fields.choice("id", kin.builtin_robots())
-    fields.done()
+def _arms(fields: Fields, least: int = 0) -> tuple[str, ...]:
+    """Ids of arms of the library."""
+    found, known = fields.texts("arms", least), kin.builtin_robots()
+    if unknown := [arm for arm in found if arm not in known]:
+        raise fields.refuse("arms", unknown[0], "ids of arms: " + ", ".join(known))
     return found
 
 

@@ -6,7 +6,7 @@ and asks here what the others have open; `Feature.on_activity` reports every cha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from contextlib import suppress
 from typing import Final, NamedTuple, Protocol
 
@@ -267,9 +267,9 @@ class Activity:
         if recalled is not None and self._seat is not None:
             self._seat.tell_recalled(recalled)
 
-    def pass_lesson(self, key: str, robot_id: str) -> None:
-        """The check of a lesson was passed on this arm."""
-        if self.progress.take_lesson(key, robot_id):
+    def pass_lesson(self, key: str, robot_id: str, arms: Collection[str]) -> None:
+        """The check of a lesson was passed on this arm, of `arms` that it asks about."""
+        if self.progress.take_lesson(key, robot_id, arms):
             self.changed()
 
     def say(self, note: str) -> None:

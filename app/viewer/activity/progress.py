@@ -112,13 +112,17 @@ class Progress:
         record = self._practice.records.get(item.key)
         return "open" if record is None else record.mark
 
-    def take_lesson(self, key: str, robot_id: str) -> bool:
-        """The check of a lesson was passed on this arm; returns whether that is news for the course."""
+    def take_lesson(self, key: str, robot_id: str, arms: Collection[str]) -> bool:
+        """The check of a lesson was passed on this arm; returns whether that is news for the course.
+
+        Args:
+            arms: those that the lesson asks about. An item with another one is passed on any of these.
+        """
         items = () if self.course is None else self.course.items
         passed = {
             i
             for i, item in enumerate(items)
-            if (item.kind, item.key) == ("lesson", key) and item.robot in ("", robot_id)
+            if (item.kind, item.key) == ("lesson", key) and (item.robot == robot_id or item.robot not in arms)
         }
         news = not passed <= self.passed
         self.passed |= passed

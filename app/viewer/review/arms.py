@@ -4,37 +4,35 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterable
 
+from app.viewer.lessons.guide.content import texts_of
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Question
-from kin import Robot
-from kin.solvers import family_of
+from kin import Robot, get_robot
 from kin.units import DEFAULT_UNITS
 
-TRIED = 6  # arms: each has all questions of the lesson made
 _NUMBER = re.compile(r"[-−]?\d+(?:[.,]\d+)?")
 
 
-def other_arm(
-    lesson: type[Lesson], question: str, robot: Robot, robots: Iterable[Robot], source: random.Random
-) -> Robot:
-    """An arm for which the question with this key differs in its numbers alone; `robot` itself if there is none.
+def other_arm(lesson: type[Lesson], question: str, robot_id: str, source: random.Random) -> Robot:
+    """One of the lesson's arms for which the question with this key differs in its numbers alone.
 
-    Only arms of the same family are tried.
+    If there is none, the arm of this id, or the lesson's first one if it asks about no arm of this id.
     """
-    asked = _question(lesson, question, robot)
-    others = [one for one in robots if one.id != robot.id and family_of(one) == family_of(robot)]
+    text = texts_of(lesson.key)
+    first = robot_id if robot_id in text.arms else text.arms[0]
+    asked = _question(lesson, question, get_robot(first))
+    others = [get_robot(arm) for arm in text.arms if arm != first]
     source.shuffle(others)
-    for other in others[:TRIED]:
+    for other in others:
         found = _question(lesson, question, other)
         if asked is not None and found is not None and _differ_in_numbers(asked, found):
             return other
-    return robot
+    return get_robot(robot_id if robot_id in text.every_arm else first)
 
 
 def _question(lesson: type[Lesson], key: str, robot: Robot) -> Question | None:
-    return dict(lesson.outline(robot, DEFAULT_UNITS).questions()).get(key)
+    return dict(lesson.asked(robot, DEFAULT_UNITS).questions()).get(key)
 
 
 def _differ_in_numbers(a: Question, b: Question) -> bool:

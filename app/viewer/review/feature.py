@@ -1,7 +1,7 @@
 """*Review*: what was missed is asked again, with other numbers. ``static/lesson.js`` sends what is pressed there.
 
 An exercise opens here, with numbers and marks of its own: those of the list of exercises, of a course and of a
-room stay as they are. The question of a lesson opens in its lesson, on another arm.
+room stay as they are. The question of a lesson opens in its lesson, on another of its arms.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.review import views
 from app.viewer.review.arms import other_arm
-from kin import InputError, UnknownRobotError
+from kin import InputError
 
 _DRAWS = 20  # seeds until the numbers are others
 
@@ -102,16 +102,12 @@ class Reviewing(Practising):
                 break
 
     def _open_question(self, missed: Missed) -> None:
-        """Open the lesson of a question, on another arm; its other answers there stay."""
+        """Open the lesson of a question, on another of its arms; its other answers there stay."""
         stage = self.stage
         lesson = next((one for one in LESSONS if one.key == missed.lesson), None)
         if lesson is None:
             raise InputError("review", missed.key, "a question of a lesson")
-        try:
-            robot = stage.store.get(missed.robot)
-        except UnknownRobotError:  # of a visitor's own arm, or of a service with other arms
-            robot = stage.store.robots[0]
-        robot = other_arm(lesson, missed.question, robot, stage.store.robots, random.Random())
+        robot = other_arm(lesson, missed.question, missed.robot, random.Random())
         self._review.move(missed.key, robot.id)
         self.change(asked_in=lesson.key, arrived=False)
         stage.activity.question_again = missed.key

@@ -14,6 +14,7 @@ from app.viewer.exercises.author import Author
 from app.viewer.exercises.feature import Practising
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.content import arm_for
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
@@ -68,7 +69,7 @@ class LessonChoice:
         self._box: viser.GuiFolderHandle | None = None
         self.shown: Lesson | None = None
         self.guide: Guide | None = None
-        self._left: dict[tuple[str, str], dict[str, object]] = {}  # progress, by lesson and robot
+        self._left: dict[tuple[str, str], dict[str, object]] = {}  # progress, by lesson and the arm asked about
 
     def choose(self, title: object, steps: dict[str, object] | None = None) -> None:
         """Open this lesson instead of the present one.
@@ -90,10 +91,10 @@ class LessonChoice:
         finally:
             self._stage.activity.changed()
 
-    def begin(self) -> None:
+    def begin(self, keep_arm: bool = False) -> None:
         """The visitor has opened the lesson, not a link or a leader: the scene comes to its pose."""
         if self.guide is not None:
-            self.guide.begin()
+            self.guide.begin(keep_arm)
 
     def _show(self, chosen: type[Feature] | None, steps: dict[str, object] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
@@ -107,7 +108,7 @@ class LessonChoice:
         elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
             with self._box:
-                left = self._left.get((chosen.key, self._stage.now.robot.id))
+                left = self._left.get((chosen.key, arm_for(chosen.key, self._stage.now.robot).id))
                 self.guide = Guide(self._stage, chosen, left if steps is None else steps, after(chosen))
                 self.shown = chosen(self._stage)
                 self.guide.attach(self.shown)
@@ -126,6 +127,11 @@ class LessonChoice:
         """
         every = (self.guide, self.shown, self.sheets, self.author, self.exercises, self.reviewing, self.courses)
         return [feature for feature in every if feature is not None]
+
+    @property
+    def misplaced(self) -> bool:
+        """Whether a link was opened to a step that is asked about another arm."""
+        return self.guide is not None and self.guide.misplaced
 
     @property
     def opened(self) -> Hashable:
@@ -153,7 +159,7 @@ class LessonChoice:
         self.author.hide()
         self.reviewing.hide()
         if self.shown is not None and self.guide is not None:
-            self._keep(self.shown.key, self.guide.state())
+            self._keep(self.shown.key, self.guide)
             self.shown.remove()
         if self.guide is not None:
             self.guide.remove()
@@ -165,11 +171,11 @@ class LessonChoice:
             self._overview.remove()
             self._overview = None
 
-    def _keep(self, lesson: str, progress: dict[str, object]) -> None:
+    def _keep(self, lesson: str, guide: Guide) -> None:
         """Keep the progress in a lesson that is closed."""
-        key = (lesson, self._stage.now.robot.id)
+        key = lesson, guide.about.id
         self._left.pop(key, None)
-        self._left[key] = progress
+        self._left[key] = guide.state()
         while len(self._left) > KEPT:
             del self._left[next(iter(self._left))]
 

@@ -125,7 +125,7 @@ class Persistence:
                 state = saved.features[feature.key]
                 self._guard(lambda feature=feature, state=state: feature.restore(state))  # type: ignore[misc]
         bare = saved.q is None and not saved.features.keys() & {lesson, "guide"}
-        if lesson is not None and bare and self._rights.compute:
+        if lesson is not None and (bare or page.lessons.misplaced) and self._rights.compute:
             self._guard(page.lessons.begin)  # such a link leaves arm and drawing to the step
         if camera is not None:  # after the lessons, which may move it too
             self._guard(lambda: page.camera.restore(camera))

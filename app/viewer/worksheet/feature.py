@@ -16,6 +16,7 @@ from app.viewer.declared.fields import Settings
 from app.viewer.declared.panel import Folder, Html, Node
 from app.viewer.feature import Stage
 from app.viewer.lessons.guide import outline as guide
+from app.viewer.lessons.guide.content import arm_for
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import update_html
 from app.viewer.panel.part import Block
@@ -81,20 +82,21 @@ class Worksheets(DeclaredFeature[Settings, Facts[Settings]]):
         ]
 
     def sheet(self) -> Sheet:
-        """The worksheet for the arm as it is."""
+        """The worksheet for the arm as it is, or for the one that the lesson asks about."""
         stage, lesson = self.stage, self._lesson
         if lesson is None:
             return Sheet("The arm at a configuration", stage.now.robot, stage.now.goal, stage.units)
-        found = type(lesson).outline(stage.now.robot, stage.units)
+        robot = arm_for(lesson.key, stage.now.robot)
+        here, found = robot == stage.now.robot, lesson.asked(robot, stage.units)
         return Sheet(
             type(lesson).title,
-            stage.now.robot,
-            stage.now.goal,
+            robot,
+            stage.now.goal if here else robot.q_home,
             stage.units,
             found.goal,
             parts_of(found),
-            lesson.formulas(),
-            lesson.left(stage.now.robot),
+            lesson.formulas() if here else (),
+            lesson.left,
         )
 
     def remove(self) -> None:
@@ -108,7 +110,8 @@ def parts_of(outline: guide.Outline) -> tuple[Part, ...]:
     for number, step in enumerate(outline.steps, 1):
         before = () if step.estimate is None else (_question(step.estimate, ""),)
         questions = before if step.question is None else (*before, _question(step.question, step.shown))
-        parts.append(Part(f"{number}. {step.title}", step.text, questions))
+        about = "" if step.about is None else f" ({step.about.name})"
+        parts.append(Part(f"{number}. {step.title}{about}", step.text, questions))
     return (*parts, Part("Check", "", tuple(_question(question) for question in outline.check)))
 
 

@@ -1,4 +1,4 @@
-"""The texts of lessons in files: what is refused, and that every text can be made for all arms in all units."""
+"""The texts of lessons in files: what is refused, and that each is made for the lesson's arms in all units."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from lesson_arms import ASKED, IDS
 
 import kin
 from app.cli.parser import main
@@ -13,14 +14,15 @@ from app.exercises import ExerciseFileError
 from app.exercises.lesson_text import lesson_files, load_lesson, parse_lesson
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.velocity.questions import facts
 from kin.units import Units
 
 FILES = lesson_files()
-ARMS = [kin.get_robot(name) for name in kin.files.classic_robots()]
 UNITS = (Units(), Units(degrees=False, length="m"), Units(length="cm"))
 SMALL = """
 goal = "You can count."
+arms = ["ur5", "puma560"]
 [facts]
 x = "a number"
 "f(i)" = "a function"
@@ -50,17 +52,14 @@ def test_lessons_have_files() -> None:
     assert FILES.keys() == {lesson.key for lesson in LESSONS}
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("key", FILES)
-def test_every_text_is_made_for_all_arms_and_units(key: str) -> None:
-    lesson = next(one for one in LESSONS if one.key == key)
-    for robot in ARMS:
-        for units in UNITS:
-            outline = lesson.outline(robot, units)
-            texts = [outline.goal, *(q.prompt + q.solution() for _, q in outline.questions())]
-            texts += [s.title + s.text + s.shown + s.practice for s in outline.steps]
-            for text in texts:
-                assert not re.search(r"[{}]|\bnan\b", text), (robot.id, text)
+@pytest.mark.parametrize(("lesson", "robot"), ASKED, ids=IDS)
+def test_every_text_is_made_for_the_lessons_arms_in_all_units(lesson: type[Lesson], robot: kin.Robot) -> None:
+    for units in UNITS:
+        outline = lesson.outline(robot, units)
+        texts = [outline.goal, *(q.prompt + q.solution() for _, q in outline.questions())]
+        texts += [s.title + s.text + s.shown + s.practice for s in outline.steps]
+        for text in texts:
+            assert not re.search(r"[{}]|\bnan\b", text), (robot.id, text)
 
 
 @pytest.mark.parametrize("key", FILES)
@@ -73,6 +72,9 @@ def test_every_declared_fact_is_used(key: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ('arms = ["ur5", "puma560"]', "", "arms: got None, expected a list"),
+        ('"puma560"]', '"puma"]', "arms: got 'puma', expected ids of arms: pioneer5"),
+        ('title = "One"', 'title = "One"\narms = ["ur"]', "steps[0].arms: got 'ur', expected ids of arms"),
         ('[example]\ntitle = "one link"', "[example]", "example.title: got None, expected a text"),
         ('text = "There are {kind}."', 'text = "There are {kid}."', "steps[0].text: got '{kid}', expected"),
         ('value = "f(x)"', 'value = "g(x)"', "steps[0].question.value: got 'g', expected a name from [facts]"),
@@ -105,7 +107,7 @@ def test_a_mistake_is_named_with_its_field(old: str, new: str, message: str) -> 
 
 
 def test_what_the_lesson_does_not_compute_is_named() -> None:
-    robot = ARMS[0]
+    robot = kin.get_robot("ur5")
     known = facts(robot, UNITS[0])
     assert outline_of("velocity", robot, UNITS[0], known).steps
     fewer = {name: value for name, value in known.numbers.items() if name != "speed"}

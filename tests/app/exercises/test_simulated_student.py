@@ -8,14 +8,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from lesson_arms import ASKED
 
-import kin
 from app.exercises import builtin_exercises
 from app.exercises.contract import Posed
 from app.exercises.kinds.number import COUNTED, NumberKind
 from app.exercises.mistakes import ROWS, Models
 from app.exercises.questions import Number, Question, Verdict
-from app.viewer.lessons import LESSONS
 from kin.units import Units
 
 UNITS = Units()
@@ -33,11 +32,10 @@ def of_library() -> Questions:
 
 
 def of_lessons() -> Questions:
-    for robot_id in list(kin.files.classic_robots())[:SEEDS]:
-        for lesson in LESSONS:
-            for key, question in lesson.outline(kin.get_robot(robot_id), UNITS).questions():
-                if isinstance(question, Number) and question.models is not None and question.answer:
-                    yield f"{lesson.key} {key}", question
+    for lesson, robot in ASKED:
+        for key, question in lesson.outline(robot, UNITS).questions():
+            if isinstance(question, Number) and question.models is not None and question.answer:
+                yield f"{lesson.key} {key}", question
 
 
 def parts(question: Question) -> tuple[Models, list[Number]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
+from typing import ClassVar
 
 from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
@@ -29,7 +30,7 @@ from app.viewer.lessons.dh.steps import length
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.scene.meshes import body
-from kin import InputError, Robot
+from kin import InputError
 
 FRAME = 1 / 30  # s between frames while playing
 MOTION_HINT = "Back and Next: to the end of the previous or next motion"
@@ -47,15 +48,12 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
     messages = frozenset({"choose", "check", "show", "back", "restart"})
     outline = staticmethod(outline)
     settings_of, facts_of = DHSettings, DHFacts
+    left: ClassVar[Left] = "table"
     pace = 0.1
 
     def __init__(self, stage: Stage) -> None:
         self._camera = BothInView(stage)
         super().__init__(stage)
-
-    @staticmethod
-    def left(robot: Robot) -> Left:
-        return "table"
 
     def started(self) -> None:
         robot = self.stage.now.robot

@@ -7,6 +7,7 @@ its point or axis next to the tool's own. For any other arm, the closed form is 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,7 +24,6 @@ from app.viewer.lessons.equations.questions import outline
 from app.viewer.lessons.equations.settings import EquationsSettings
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel.status import Notice
-from kin import Robot
 
 AFTER_EDIT = 0.5  # s without another change of the visitor's own arm, before its equations are derived
 # Vermilion and bluish green, darkened because the scene applies gamma to lines.
@@ -40,10 +40,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
     about = "The arm’s equations. For the book’s arms, also its misprints."
     outline = staticmethod(outline)
     settings_of, facts_of = EquationsSettings, EquationsFacts
-
-    @staticmethod
-    def left(robot: Robot) -> Left:
-        return "pose"
+    left: ClassVar[Left] = "pose"
 
     def running(self) -> Sequence[Work]:
         robot, own = self.stage.now.robot, self.stage.own

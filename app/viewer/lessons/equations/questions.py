@@ -13,13 +13,9 @@ from app.viewer.lessons.guide.leads import DOWN, UP, bar, direction
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, first_clear
 from kin import Robot, fk, jacobian
-from kin.axes import NEARLY
-from kin.differential.task import lifts
 from kin.transforms import Array
 from kin.units import Units, fixed
 
-SAMPLES = 8
-LEVEL = 1e-3  # m of height that count as none
 NEAR = 0.01  # m by which a printed coordinate may differ from the right one
 _TRIED, _ROUNDS = 40, 20
 
@@ -37,26 +33,23 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     i, j = "xyz"[(k + 1) % 3], "xyz"[(k + 2) % 3]
     entry = int(np.argmax(np.abs(T[:3, 3])))
     hidden = without(robot, entry)
-    product = flipped(T, k, 0)
     numbers: dict[str, float | Quantity] = {
         "largest": float(n[k]),
-        "found": float(product > NEARLY),
         "entry": entry + 1.0,
-        "hidden": float(hidden is not None),
         "near": Quantity(NEAR, "length"),
-        "raises": float(changes_height(robot, 0)),
     }
     words = {
         "p": "(" + ", ".join(units.lengths.number(v) for v in T[:3, 3].tolist()) + f"){units.lengths.suffix}",
         **{f"{name}_column": _vector(T[:3, column]) for column, name in ((1, "o"), (2, "a"))},
         "entry_name": f"p{'xyz'[entry]}",
+        "height": "Higher" if T[2, 3] > 0.0 else "Lower",
+        "other_height": "Lower" if T[2, 3] > 0.0 else "Higher",
         "component": "xyz"[k],
         "terms": f"o{i} a{j} − o{j} a{i}",
         "tested": f"n{'xyz'[k]}",
-        "product": fixed(product, 3),
+        "product": fixed(flipped(T, k, 0), 3),
     }
-    there = robot.q_home if hidden is None else hidden
-    functions = {"hides": lambda joint: float(there[int(joint) - 1])}
+    functions = {"hides": lambda joint: float(hidden[int(joint) - 1])}
     return LessonFacts(
         numbers, functions, words, {"home": Pose(as_configuration(robot.q_home))}, leads=leads(robot, T)
     )
@@ -66,19 +59,17 @@ def leads(robot: Robot, T: Array) -> dict[str, Lead | None]:
     """The columns of the tool's pose ``(4, 4)``, and ways up, level and down to where the tool point is."""
     p, foot = T[:3, 3], np.array([T[0, 3], T[1, 3], 0.0])
     ways = {name: direction(robot, p, T[:3, column]) for column, name in enumerate("noa")}
-    heights = {"higher": direction(robot, foot, UP), "lower": direction(robot, foot, DOWN)}
-    if abs(p[2]) > LEVEL:
-        heights["higher" if p[2] > 0.0 else "lower"] = bar(foot, p)
-    level = bar(np.zeros(3), foot) if np.linalg.norm(foot) > LEVEL else None
-    return {**ways, **heights, "p": bar(np.zeros(3), p), "as high": level}
+    other = direction(robot, foot, DOWN if p[2] > 0.0 else UP)
+    heights = {"height": bar(foot, p), "other height": other, "as high": bar(np.zeros(3), foot)}
+    return {**ways, **heights, "p": bar(np.zeros(3), p)}
 
 
 @lru_cache(maxsize=64)
-def without(robot: Robot, entry: int) -> Array | None:
-    """A configuration ``(n,)`` with one coordinate of the tool point at zero; None: none, or home has it."""
-    if abs(fk(robot, robot.q_home)[entry, 3]) <= NEAR:
-        return None
-    return first_clear(robot, _at_zero(robot, entry))
+def without(robot: Robot, entry: int) -> Array:
+    """A configuration ``(n,)`` with one coordinate of the tool point at zero."""
+    found = first_clear(robot, _at_zero(robot, entry))
+    assert found is not None
+    return found
 
 
 def _at_zero(robot: Robot, entry: int) -> Iterator[Array]:
@@ -103,9 +94,3 @@ def flipped(T: Array, row: int, column: int) -> float:
     R = T[:3, :3].copy()
     R[row, column] *= -1.0
     return float(np.abs(R.T @ R - np.eye(3)).max())
-
-
-def changes_height(robot: Robot, joint: int) -> bool:
-    """Whether a joint ever changes z of the tool point."""
-    q = robot.random_q(np.random.default_rng(5), SAMPLES)
-    return lifts(robot, jacobian(robot, q), joint)

@@ -37,7 +37,7 @@ from app.viewer.lessons.guide.outline import (
     SemiAxis,
     Step,
 )
-from kin import Robot, fk
+from kin import Robot, fk, get_robot
 from kin.units import Units
 
 T = TypeVar("T")
@@ -105,13 +105,27 @@ def texts_of(lesson: str) -> LessonText:
     return load_lesson(lesson_files()[lesson])
 
 
+def arms_of(lesson: str) -> tuple[str, ...]:
+    """The ids of the arms that a lesson asks about, but for single steps; none of one that has no file."""
+    return texts_of(lesson).arms if lesson in lesson_files() else ()
+
+
+def arm_for(lesson: str, robot: Robot) -> Robot:
+    """The arm that a lesson asks about while this one is on show: itself if the file names it, else the first."""
+    arms = arms_of(lesson) or (robot.id,)
+    return robot if robot.id in arms else get_robot(arms[0])
+
+
 def written_example(lesson: str) -> WorkedText | None:
     """The worked example of a lesson; None of one that has no file."""
     return texts_of(lesson).example if lesson in lesson_files() else None
 
 
 def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts | AskedFacts) -> Outline:
-    """The outline of a lesson with a file; raises `ExerciseFileError` for what the facts do not have."""
+    """The outline of a lesson with a file; raises `ExerciseFileError` for what the facts do not have.
+
+    Steps and check that the file asks about other arms are left empty.
+    """
     text = texts_of(lesson)
     if isinstance(facts, AskedFacts):
         facts = facts.listed(text.facts)
@@ -123,8 +137,12 @@ def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts | Ask
     words = {name: first.text(alias, units) for name, alias in text.words.items()}
     variant = Variant(lesson, robot, robot.q_home, values, None, facts.functions, {**facts.words, **words})
     made = _Maker(text.file, variant, units, facts)
-    steps = tuple(made.step(step) for step in text.steps if made.holds(step.when))
-    check = [one for one in map(made.first, text.check) if one is not None]
+    steps = tuple(
+        made.step(step) if robot.id in (step.arms or text.arms) else made.elsewhere(step)
+        for step in text.steps
+        if made.holds(step.when)
+    )
+    check = [one for one in map(made.first, text.check if robot.id in text.arms else ()) if one is not None]
     return Outline(
         variant.text(text.goal, units),
         steps,
@@ -204,6 +222,10 @@ class _Maker:
             raise ExerciseFileError(self.file, "drawn.joint", joint, "a joint of the arm")
         return Drawn(pose.q, joint - 1)
 
+    def elsewhere(self, text: StepText) -> Step:
+        """A step that is asked about other arms."""
+        return Step(self.variant.text(text.title, self.units), "", arms=text.arms)
+
     def step(self, text: StepText) -> Step:
         asked, before = self.first(text.questions), self.first(text.estimate)
         title, body, shown, practice = (
@@ -223,5 +245,5 @@ class _Maker:
             estimate=None if before is None else self.question(before),
             guessed=self.leads(before),
             answered=self.named("answered", text.answered, self.facts.answered),
-            arm="" if text.arm is None or not self.holds(text.arm[0]) else text.arm[1],
+            arms=text.arms,
         )

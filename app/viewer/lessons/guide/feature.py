@@ -19,7 +19,7 @@ from app.viewer.exercises.views import Following
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
 from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
-from app.viewer.lessons.guide.content import written_example
+from app.viewer.lessons.guide.content import arm_for, arms_of, written_example
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Outline, Pose
@@ -34,6 +34,9 @@ from kin.transforms import Array, pose_from_position_wxyz
 from kin.typed import EntryError
 
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
+# Events of a question, which is asked about one arm.
+ANSWERS = frozenset({"answer", "fields", "posture", "pick", "reveal", "pose", "offer", "drag"})
+HERE = "The arm is at the pose of this step."
 
 
 class Guide(Feature):
@@ -42,6 +45,10 @@ class Guide(Feature):
     Args:
         state: how far the visitor is, as `state` returned it; None: at the beginning.
         following: the title of the lesson that comes after this one; "": none does.
+
+    Attributes:
+        about: the arm that it asks about, which need not be on show; a step may be about another one.
+        misplaced: whether a state was restored of an arm that it no longer asks about.
     """
 
     key = "guide"
@@ -71,10 +78,11 @@ class Guide(Feature):
     ) -> None:
         super().__init__(stage)
         self._lesson, self._following = lesson, following
+        self.about = arm_for(lesson.key, stage.now.robot)
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
         self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
-        self._arms: dict[Robot, Progress] = {stage.now.robot: self._progress}  # what was answered on each
+        self._arms: dict[Robot, Progress] = {self.about: self._progress}  # what was answered on each
         self._drawing = Drawing(stage.client.scene, self.post)
         self._copies = SceneView(stage.client.scene, "answer", self.post)
         self._answer_ends = np.zeros((0, 3))  # what the picture has to contain to show the last answer
@@ -97,9 +105,12 @@ class Guide(Feature):
         self._shown = lesson
         self._show()
 
-    def begin(self) -> None:
-        """The visitor has opened the lesson: the scene comes to the step on show."""
-        self._open_step()
+    def begin(self, keep_arm: bool = False) -> None:
+        """The visitor has opened the lesson, or chosen an arm to keep: the scene comes to the step on show."""
+        if self._wants_arm and not keep_arm:
+            self._fetch_arm()
+        else:
+            self._open_step()
 
     def handle(self, key: Hashable, value: object) -> None:
         progress = self._progress
@@ -112,6 +123,8 @@ class Guide(Feature):
                 self._show_joints(bool(value))
                 return
         self._example.close()
+        if not self.is_asked and isinstance(key, tuple) and key[0] in ANSWERS:
+            return  # a late press
         match key:
             case ("leave", int()):
                 return
@@ -119,7 +132,7 @@ class Guide(Feature):
                 progress.go(value)
                 self._sheets.clear()
                 self._show()
-                self._open_step()
+                self.begin()
             case ("answer" | "fields" | "posture", str(question), int()):
                 self._answer(question, value, key[0] == "fields")
             case ("pick", str(question), int()):
@@ -131,9 +144,7 @@ class Guide(Feature):
             case ("pose", int()):
                 self._bring()
             case ("arm", int()):
-                if robot_id := self._offered:
-                    self.stage.change_robot(self.stage.store.get(robot_id))
-                    return
+                self._fetch_arm()
             case ("offer", int()):
                 if self._shown is not None:
                     self._shown.on_offer()
@@ -163,10 +174,15 @@ class Guide(Feature):
         return progress.at, sum(progress.misses.values()), tuple(map(progress.mark, progress.questions))
 
     @property
-    def _offered(self) -> str:
-        """The id of the arm that the step on show offers instead of this one; "": none."""
+    def asked_about(self) -> Robot:
+        """The arm that the step on show, or the check, is about."""
         steps, at = self._progress.outline.steps, self._progress.at
-        return steps[at].arm if at < len(steps) else ""
+        return (steps[at].about if at < len(steps) else None) or self.about
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether that arm is on show: with another one the step can be read, and the lesson be explored."""
+        return self.stage.now.robot == self.asked_about
 
     def step_name(self, key: Hashable) -> str:
         names = {
@@ -182,15 +198,22 @@ class Guide(Feature):
     def on_robot(self) -> None:
         self._example.close()
         # Other numbers are asked on another arm, and answers stay with theirs.
-        at, before, outline = self._progress.at, self._progress.outline, self._outline()
-        self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
-        self._progress = self._arms.setdefault(self.stage.now.robot, Progress(outline))
-        self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
-        self._progress.use(outline)
-        self._progress.at = outline.step_like(before, at)
+        robot = self.stage.now.robot
+        if not self.is_asked and robot.id in arms_of(self._lesson.key):
+            self._ask_about(robot)
         self._sheets.clear()
         self._copies.remove()
         self._show()
+
+    def _ask_about(self, robot: Robot) -> None:
+        """Go on with the questions about another arm that the file names, at the same step."""
+        at, before, self.about = self._progress.at, self._progress.outline, robot
+        outline = self._outline()
+        self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
+        self._progress = self._arms.setdefault(robot, Progress(outline))
+        self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
+        self._progress.use(outline)
+        self._progress.at = outline.step_like(before, at)
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._example.on_pose()
@@ -213,15 +236,20 @@ class Guide(Feature):
         return {
             **self._progress.state(),
             "joints": self._joints is not None,
+            **({} if self.about.id == self.stage.now.robot.id else {"arm": self.about.id}),
             **({"earlier": drawn} if drawn else {}),
         }
 
     def restore(self, state: dict[str, object]) -> None:
         self._example.close()
+        arms, arm = arms_of(self._lesson.key), state.get("arm")
+        if isinstance(arm, str) and arm in arms and arm != self.about.id:
+            self._ask_about(self.stage.store.get(arm))
         exercises = self.stage.activity.courses.exercises
         self._earlier[self._progress] = earlier.read(state.get("earlier"), exercises)
         self._ask_earlier()
         self._progress.restore(state)
+        self.misplaced = bool(state) and arm is None and not self.is_asked
         self._sheets.clear()
         self._show()
         if isinstance(joints := state.get("joints"), bool):
@@ -243,7 +271,7 @@ class Guide(Feature):
         self._progress.ask_also(earlier.questions(drawn, exercises, self.stage.units))
 
     def _outline(self) -> Outline:
-        return self._lesson.outline(self.stage.now.robot, self.stage.units)
+        return self._lesson.asked(self.about, self.stage.units)
 
     # Answers
 
@@ -300,7 +328,7 @@ class Guide(Feature):
         """Show the step with nothing entered, at its pose."""
         self._sheets.clear()
         self._show()
-        self._bring()
+        self.begin()
 
     def _note(self, key: str, right: bool) -> None:
         """An answer was judged or shown: what was missed comes back. An estimate may be wrong."""
@@ -310,29 +338,46 @@ class Guide(Feature):
             assert exercise is not None
             activity.take_exercise(exercise, right)
         elif not key.startswith("e"):
-            activity.take_question(self._lesson.key, key, self.stage.now.robot.id, right)
+            activity.take_question(self._lesson.key, key, self.asked_about.id, right)
 
     # The scene
 
-    def _bring(self) -> None:
+    def _bring(self, words: str = HERE) -> None:
         """Bring the scene to the pose of the step on show."""
         progress = self._progress
-        if (pose := progress.outline.pose_of(progress.at)) is not None:
-            self._show_pose(pose, "The arm is at the pose of this step.")
+        if self.is_asked and (pose := progress.outline.pose_of(progress.at)) is not None:
+            self._show_pose(pose, words)
 
-    def _open_step(self) -> None:
+    def _open_step(self, words: str = HERE) -> None:
         """Bring the scene to the step on show: once it is answered, to the answer, of which its words speak."""
         steps, at = self._progress.outline.steps, self._progress.at
         answered = at < len(steps) and steps[at].question is not None and self._progress.is_closed(str(at + 1))
         if answered and steps[at].end is not None:
             self._move_to_end(str(at + 1))
         else:
-            self._bring()
+            self._bring(words)
+
+    @property
+    def _wants_arm(self) -> bool:
+        """Whether a question on show is about another arm, and no course wants this one here."""
+        progress, item = self._progress, self.stage.activity.progress.item
+        here = "lesson", self._lesson.key, self.stage.now.robot.id
+        if self.is_asked or (item is not None and (item.kind, item.key, item.robot) == here):
+            return False
+        asked = (key for key in progress.questions if key[0] not in "er" and self._is_on_show(key))
+        return not all(map(progress.is_closed, asked))
+
+    def _fetch_arm(self) -> None:
+        """Show the arm that the step is about at its pose, and say so."""
+        left, about = self.stage.now.robot, self.asked_about
+        if left != about:
+            self.stage.change_robot(about)
+            self._open_step(f"This is asked about {about.name}. Undo brings {left.name} back.")
 
     def _move_to_end(self, key: str) -> None:
         """Let the scene show the answer to a question of the step on show; an arm that was driven there stays."""
         steps, at = self._progress.outline.steps, self._progress.at
-        if key != str(at + 1) or at >= len(steps):
+        if key != str(at + 1) or at >= len(steps) or not self.is_asked:
             return
         question, end = steps[at].question, steps[at].end
         if end is None and key in self._progress.revealed and question is not None:
@@ -361,25 +406,27 @@ class Guide(Feature):
         return None
 
     def _show(self) -> None:
-        if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
+        here = self.is_asked
+        if here and self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
             self._progress.use(outline)
         progress, activity = self._progress, self.stage.activity
+        withheld = progress.withheld if here else frozenset[str]()
         if progress.at == len(progress.outline.steps) and not self._earlier.get(progress):
             self._earlier[progress] = earlier.choose(self._lesson.key, activity)
             self._ask_earlier()
-        if activity.asked != progress.withheld:  # before anything is shown that would give it away
-            activity.asked = progress.withheld
+        if activity.asked != withheld:  # before anything is shown that would give it away
+            activity.asked = withheld
             activity.changed()
         right, count = progress.score
         if right == count > 0:
-            activity.pass_lesson(self._lesson.key, self.stage.now.robot.id)
+            activity.pass_lesson(self._lesson.key, self.about.id, arms_of(self._lesson.key))
         open_ = [key for key in progress.questions if self._is_on_show(key)]
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
-        offered = self.stage.store.get(self._offered).name if self._offered else ""
+        offered = "" if here else self.asked_about.name
         sheets = {key: self._sheet(key) for key in open_}
-        of = f"{self._lesson.key} {self.stage.now.robot.id}"
+        of = f"{self._lesson.key} {self.about.id}"
         update_html(self._steps, views.steps_html(progress, sheets, of, offered, self._leading_on()))
-        forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
+        forms = {key: progress.question(key).asked() for key in open_ if here and not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
         self._draw_answer()
         if any(asked.form == "posture" for asked in forms.values()):
@@ -401,7 +448,7 @@ class Guide(Feature):
         """Where the last answer to the step on show leads, if the step says how it is drawn."""
         progress = self._progress
         steps, key, nodes = progress.outline.steps, str(progress.at + 1), list[Node]()
-        if progress.at < len(steps):
+        if self.is_asked and progress.at < len(steps):
             robot, step = self.stage.now.robot, steps[progress.at]
             nodes = answer_nodes(robot, step, progress.given.get(key), progress.is_closed(key))
             if not nodes and step.guessed is not None and key not in progress.given:
@@ -424,7 +471,7 @@ class Guide(Feature):
         """The corners ``(n, 3)`` of a cube with the frame that is asked for: they tell how far, not which way."""
         progress = self._progress
         key, steps = str(progress.at + 1), progress.outline.steps
-        question = steps[progress.at].question if progress.at < len(steps) else None
+        question = steps[progress.at].question if self.is_asked and progress.at < len(steps) else None
         if question is None or question.asked().form != "frame" or progress.is_closed(key):
             return np.zeros((0, 3))
         right: Any = question.right()

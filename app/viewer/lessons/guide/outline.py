@@ -26,6 +26,7 @@ from app.exercises.questions import (
     one_right,
     two_percent,
 )
+from kin import Robot
 from kin.axes import perpendicular_to
 from kin.transforms import Array
 from kin.units import PLAIN
@@ -205,7 +206,8 @@ class Step:
         estimate: what is asked before the question, and answered by looking.
         guessed: how its answer is drawn, as `drawn`.
         answered: a figure of the last answer, which also has the right one once it is on show.
-        arm: the id of an arm of the library that shows what the arm on show cannot; "": it can.
+        arms: ids of the arms of the library that it is asked about; empty: those of the lesson.
+        about: the arm of its question, if that is another one than that of the outline.
         offer: what a button below the words does, by `Lesson.on_offer`, as its label; "": there is none.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
@@ -224,7 +226,8 @@ class Step:
     estimate: Question | None = None
     guessed: Leads | None = None
     answered: Answered | None = None
-    arm: str = ""
+    arms: tuple[str, ...] = ()
+    about: Robot | None = None
     offer: str = ""
 
 

@@ -31,7 +31,7 @@ def steps_html(
     Args:
         sheets: what was entered, by the key of the question.
         of: names the lesson and the arm: what is typed for one arm is nothing for another one.
-        arm: the name of the arm that the step offers instead of this one.
+        arm: the name of the arm that the questions are about, if it is not on show: they are not asked then.
         following: the button that leads on after a check that was passed.
     """
     steps, at = progress.outline.steps, progress.at
@@ -50,6 +50,7 @@ def steps_html(
         return render(
             "guide/check",
             of=of,
+            arm=arm,
             marks=marks,
             at=at,
             questions=asked,
@@ -71,10 +72,10 @@ def steps_html(
         at=at,
         step=step,
         arm=arm,
-        question=None if step.question is None else _question(progress, key, step.question, sheets),
-        estimate=None if estimate is None else _question(progress, before, estimate, sheets),
+        question=None if step.question is None or arm else _question(progress, key, step.question, sheets),
+        estimate=None if estimate is None or arm else _question(progress, before, estimate, sheets),
         open=closed,
-        answered="" if step.answered is None else step.answered(given, fine, closed),
+        answered="" if step.answered is None or arm else step.answered(given, fine, closed),
     )
 
 

@@ -20,6 +20,7 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.feature import Stage
 from app.viewer.lessons.figure_nodes import FigureNodes
+from app.viewer.lessons.guide.content import arms_of
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number, Outline
 from app.viewer.lessons.guide.poses import as_configuration
@@ -36,7 +37,6 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
 from kin import Robot
 
-ARMS = ("planar2r", "planar3r", "pioneer5", "puma560", "redundant7-craig")
 FOLLOW_HINT = "The branch that the numbers and the figure follow, by its number in the tree"
 POSTURE_HINT = "Moves the arm to the branch that you follow"
 ASK_HINT = "Asks the questions again, about the pose that the arm has now"
@@ -53,16 +53,13 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     about = "From a target to the joint angles by hand, and where each solution comes from."
     outline = staticmethod(outline)
     settings_of, facts_of = InverseSettings, InverseFacts
+    left: ClassVar[Left] = "configuration"
     undo: ClassVar[dict[str, str]] = {"on_follow": "Branch", "on_arm": "Arm"}
     pace = 0.1
 
     def __init__(self, stage: Stage) -> None:
         self._arms: dict[Robot, InverseSettings] = {}  # what was asked and followed on other arms
         super().__init__(stage)
-
-    @staticmethod
-    def left(robot: Robot) -> Left:
-        return "configuration"
 
     def started(self) -> None:
         if (own := self._arms.get(self.stage.now.robot)) is not None:
@@ -82,7 +79,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         if not f.exists:
             arms = [
                 Button(self.stage.store.get(robot).name, self.event(self.on_arm, robot), ARM_HINT, key=robot)
-                for robot in ARMS
+                for robot in arms_of(self.key)
             ]
             return [Html(views.others_html, (f.robot,), key="others"), *arms]
         opened = dict(zip(f.keys, f.opened, strict=True))
@@ -113,13 +110,12 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     # The steps
 
     def on_steps(self, progress: Progress) -> Outline | None:
-        if self.facts.robot is not self.stage.now.robot or not self.facts.exists:
+        if self.facts.robot is not self.stage.now.robot:
             return None
         if self.settings.restart:
             progress.restart()
             self.change(restart=False, taken={})
-        units = self.stage.units
-        progress.use(outline_of(self._exercise, units))
+        progress.use(self._outline)
         for number, key in enumerate(self.facts.keys, 1):
             self._take_way(progress, str(number), key)
         asked = dict(progress.outline.questions())
@@ -137,6 +133,12 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self.invalidate()
         return self.facts.exercise
 
+    @property
+    def _outline(self) -> Outline:
+        """The outline with the questions about it."""
+        units = self.stage.units
+        return self.completed(outline_of(self._exercise, units), self.facts.robot, units)
+
     def _take_way(self, progress: Progress, number: str, key: StepKey) -> None:
         """Follow the other way where the student has typed it."""
         question, answer = dict(progress.outline.questions()).get(number), progress.given.get(number)
@@ -149,7 +151,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         step = given.followed.derivation.step(key)
         if question.way_of(answer) > 0 and step is not None and step.split >= 0:
             self.change(signs=flipped(given.signs, step.split))
-            progress.use(outline_of(self._exercise, self.stage.units))
+            progress.use(self._outline)
 
     # Events
 

@@ -46,7 +46,8 @@ _METHODS: dict[StepKey, str] = {
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm, with a target near its home."""
     arm = arm_of(robot)
-    return words.texts(robot, units) if arm is None else outline_of(exercise(arm, example(arm)), units)
+    assert arm is not None
+    return outline_of(exercise(arm, example(arm)), units)
 
 
 def outline_of(given: Exercise, units: Units) -> Outline:
@@ -83,9 +84,6 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
         return replace(step, text=f"{text} {words.failure_text(found, units)}", offer=_way_back(given))
     question, text = _question(given, found, units), f"{text} {words.special_text(given.arm, found)}".rstrip()
     step = replace(step, text=text, question=question, practice=_shown(given, found))
-    if question is not None and key == "centre" and given.arm.robot.n == 2:  # the distance of the tool
-        base, tool = given.arm.robot.T_world_base[:3, 3], given.T[:3, 3]
-        return replace(step, drawn=bar(base, tool))
     if question is None or question.unit != units.angles:
         return step
     return replace(step, withheld=TURNS, drawn=_drawn(given, key))
@@ -111,10 +109,8 @@ def _target(given: Exercise, units: Units) -> str:
     unit = units.lengths
     point = ", ".join(unit.number(v(f"p_{axis}")) for axis in axes)
     text = f"The target: p = ({point}){unit.suffix}"
-    if given.arm.robot.n == 3:
-        return f"{text}, and the tool points along φ = {units.angles.text(math.atan2(v('x_y'), v('x_x')))}."
     if given.arm.family == "planar":
-        return f"{text}."
+        return f"{text}, and the tool points along φ = {units.angles.text(math.atan2(v('x_y'), v('x_x')))}."
     direction = ", ".join(fixed(v(f"a_{axis}")) for axis in axes)
     return f"{text}, a = ({direction})."
 
@@ -208,28 +204,6 @@ def _method(given: Exercise, key: StepKey) -> str:
 
 def _centre(given: Exercise, units: Units) -> Number:
     derivation, arm = given.followed.derivation, given.arm
-    if "D" in derivation.values and arm.robot.n == 2:
-        p = derivation.number
-        wrong = tuple(
-            Mistake(value, reason)
-            for value, reason in (
-                (
-                    abs(p("w_x")) + abs(p("w_y")),
-                    "Coordinates do not add up to a distance: add their squares and take the root.",
-                ),
-                (abs(p("w_x")), "That is x alone."),
-            )
-        )
-        return apart(
-            Number(
-                "How large is D, the distance of the point from joint 1?",
-                p("D"),
-                units.lengths,
-                LENGTH,
-                "D = √(x² + y²).",
-                wrong,
-            )
-        )
     axis = mistakes.coordinate(derivation)
     last = arm.lengths.get("l3", abs(float(arm.wrist[2])))
     size = units.lengths.text(last)

@@ -16,7 +16,7 @@ from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, first_clear
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
-from kin import Robot, branch_names, fk, solve_ik
+from kin import Robot, fk, solve_ik
 from kin.axes import is_zero
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units, fixed
@@ -40,26 +40,23 @@ def _facts(robot: Robot) -> LessonFacts:
     """What the file declares."""
     arm = arm_of(robot)
     family, beside = (None, 0.0) if arm is None else (arm.family, arm.lengths.get("b", 0.0))
+    most, strays = fewer(robot)
     numbers: dict[str, float | Quantity] = {
-        "derived": float(arm is not None),
         "planar": float(family == "planar"),
         "five": float(family == "wrist5"),
         "ball": float(family == "srs7"),
         "joints": float(robot.n),
-        "offset": float(beside != 0.0),
         "beside": Quantity(beside, "length"),
+        "most": float(most),
     }
     elbow = sub(f"θ{2 if family == 'planar' else 4 if family == 'srs7' else 3}")
     home = Pose(as_configuration(robot.q_home))
-    most, strays = fewer(robot) if branch_names(robot) else (0, None)
-    there = robot.q_home if strays is None else strays
-    numbers |= {"most": float(most), "fewer": float(strays is not None)}
-    functions = {"strays": lambda joint: float(there[int(joint) - 1])}
-    return LessonFacts(numbers, functions, {"elbow": elbow, "arm": robot.name}, {"home": home})
+    functions = {"strays": lambda joint: float(strays[int(joint) - 1])}
+    return LessonFacts(numbers, functions, {"elbow": elbow}, {"home": home})
 
 
 @lru_cache(maxsize=64)
-def fewer(robot: Robot) -> tuple[int, Array | None]:
+def fewer(robot: Robot) -> tuple[int, Array]:
     """How many postures reach the pose of home, and a configuration ``(n,)`` whose pose fewer reach."""
 
     def count(q: Array) -> int:
@@ -69,9 +66,8 @@ def fewer(robot: Robot) -> tuple[int, Array | None]:
     stretched = robot.q_home.copy()
     stretched[1:] = np.clip(0.0, robot.lower[1:], robot.upper[1:])
     tried = (stretched, *robot.random_q(np.random.default_rng(8), TRIED))
-    if robot.n == 2:  # a planar arm: only the point is asked for
-        return most, stretched
-    return most, first_clear(robot, (np.asarray(q) for q in tried if 0 < count(q) < most))
+    found = first_clear(robot, (np.asarray(q) for q in tried if 0 < count(q) < most))
+    return most, robot.q_home if found is None else found
 
 
 def title(arm: Arm, key: StepKey) -> str:

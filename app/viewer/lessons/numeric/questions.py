@@ -16,7 +16,7 @@ from app.viewer.lessons.numeric import iteration
 from app.viewer.lessons.numeric.example import Example, example
 from app.viewer.lessons.numeric.iteration import Method, Problem, Run, Settings
 from app.viewer.lessons.numeric.settings import LIMITS
-from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
+from app.viewer.lessons.numeric.views import NAMES, error_chart
 from kin import Robot, fk, get_robot
 from kin.transforms import Array
 from kin.units import Units, power
@@ -50,16 +50,9 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     here, there = fk(robot, known.start)[:3, 3], problem.T[:3, 3]
     sigma = round(max(smallest_value(known), 1e-3), 3)
     numbers = {
-        "whole_pose": problem.match == "pose",
-        "joints": robot.n,
-        "rows": len(problem.rows),
         "far": np.linalg.norm(there - here),
-        "part": np.linalg.norm(there - here) / robot.reach,
         "sum": np.abs(there - here).sum(),
         "newton": newton.count,
-        "transpose": transpose.count,
-        "damped": damped.count,
-        "arrives": transpose.outcome == "reached",
         "sigma": sigma,
         "damping": DAMPING,
         "error": ERROR,
@@ -70,7 +63,6 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "first_error": power(float(newton.errors[0])),
         "second_error": ", then ".join(power(float(v)) for v in newton.errors[1:3]),
         "newton_error": power(float(newton.errors[-1])),
-        "left": amount(lengths, float(transpose.far[-1])),
         "sigma_shown": f"{sigma:.3f}",
         "remaining": f"{DAMPING**2 / (sigma**2 + DAMPING**2):.3f}",
         "coarse": lengths.brief(0.1),
@@ -102,8 +94,7 @@ def leads(robot: Robot, here: Array, there: Array) -> dict[str, Lead | None]:
     """From the tool towards its target, as far as an estimate says; the true one leads to the target."""
     way = there - here
     part = float(np.linalg.norm(way)) / robot.reach
-    shares = {"near": 0.05, "middle": 0.3, "distant": 0.7}
-    shares["near" if part < 0.1 else "middle" if part <= 0.5 else "distant"] = part
+    shares = {"near": 0.05, "middle": part, "distant": 0.7}
     return {name: bar(here, here + share / part * way) for name, share in shares.items()}
 
 

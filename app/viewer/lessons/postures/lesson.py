@@ -17,7 +17,6 @@ from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
 import kin
-from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
@@ -29,7 +28,6 @@ from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.postures import loop, remedies
 from app.viewer.lessons.postures.directions import Cone, cone_html, has_cone
 from app.viewer.lessons.postures.facts import PosturesFacts
-from app.viewer.lessons.postures.planar import is_planar
 from app.viewer.lessons.postures.questions import outline
 from app.viewer.lessons.postures.remedies import Remedy, Request
 from app.viewer.lessons.postures.settings import PosturesSettings
@@ -38,7 +36,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.postures.ghosts import ghosts
 from app.viewer.postures.survey import html
 from app.viewer.views.templates import render
-from kin import IKResult, Robot
+from kin import IKResult
 from kin.transforms import Array
 from kin.units import Units
 
@@ -61,10 +59,6 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
     settings_of, facts_of = PosturesSettings, PosturesFacts
     undo: ClassVar[dict[str, str]] = {"on_go": "Posture", "on_remedy": "Remedy", "on_way_point": "Way point"}
     pace = 0.1
-
-    @staticmethod
-    def left(robot: Robot) -> Left:
-        return "configuration" if is_planar(robot) else "nothing"
 
     # What is shown
 

@@ -1,4 +1,4 @@
-"""Both postures of a planar arm by hand: the ring that it reaches, the cosine rule, the other elbow."""
+"""Both postures of two links by hand: the ring that it reaches, the cosine rule, the other elbow."""
 
 from __future__ import annotations
 
@@ -25,19 +25,17 @@ def is_planar(robot: Robot) -> bool:
 
 
 def other_elbow(robot: Robot) -> Array:
-    """The configuration ``(n,)`` with the other elbow, for the tool pose or point that the arm has at home."""
+    """The configuration ``(n,)`` with the other elbow, for the tool point that the arm has at home."""
     l1, l2 = robot.rows[0].a, robot.rows[1].a
     q = robot.q_home.copy()
     # The angle from the first link to the line from axis 1 to the point.
     beside = math.atan2(l2 * math.sin(q[1]), l1 + l2 * math.cos(q[1]))
     q[0], q[1] = math.remainder(q[0] + 2.0 * beside, 2.0 * math.pi), -q[1]
-    if robot.n == 3:
-        q[2] = math.remainder(float(robot.q_home.sum() - q[0] - q[1]), 2.0 * math.pi)
     return q
 
 
 def facts(robot: Robot, units: Units) -> tuple[dict[str, float | Quantity], dict[str, str]]:
-    """The numbers and the words of the steps by hand, for the point that the second link has at home.
+    """The numbers and the words of the steps by hand, for the tool point at home.
 
     For an arm that is not planar they mean nothing, and no text uses them.
     """
@@ -46,7 +44,6 @@ def facts(robot: Robot, units: Units) -> tuple[dict[str, float | Quantity], dict
     x, y = l1 * math.cos(q[0]) + l2 * math.cos(q[0] + q[1]), l1 * math.sin(q[0]) + l2 * math.sin(q[0] + q[1])
     length = units.lengths
     numbers: dict[str, float | Quantity] = {
-        "planar": float(is_planar(robot)),
         "l1": Quantity(l1, "length"),
         "l2": Quantity(l2, "length"),
         "far": Quantity(math.hypot(x, y), "length"),
@@ -57,7 +54,6 @@ def facts(robot: Robot, units: Units) -> tuple[dict[str, float | Quantity], dict
         "ring_inside": length.text(abs(l1 - l2)),
         "ring_outside": length.text(l1 + l2),
         "theta2_sign": "positive" if q[1] > 0.0 else "negative",
-        "point": "the tool point" if robot.n == 2 else "axis 3",
         "place": f"({length.number(x)}, {length.number(y)}){length.suffix}",
     }
 

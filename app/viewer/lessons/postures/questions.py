@@ -16,9 +16,7 @@ from app.viewer.lessons.guide.poses import as_configuration, distance
 from app.viewer.lessons.postures import planar
 from app.viewer.lessons.postures.loop import Round, loop_of
 from app.viewer.scene.chain import rotation
-from kin import IKOptions, Robot, Status, branch_names, branch_of, fk, jacobian
-from kin.axes import NEARLY
-from kin.differential.task import free_motions, rank
+from kin import IKOptions, Robot, Status, branch_names, branch_of, fk
 from kin.ik import IKSolution, branch_meanings, solve
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
@@ -37,10 +35,8 @@ class Solved(NamedTuple):
         found: the solutions within the limits.
         other: the solution that differs most from home; None if there is no other one.
         rolled: how many solutions within the limits there are if the tool is rolled by `ROLL`.
-        roll: the status of that target.
-        rank: of the Jacobian at home.
         goal: the posture of another solution, the one that differs in the fewest parts; "" if there is none.
-        postures: a configuration of each branch that reaches the pose, or the point, within the limits.
+        postures: a configuration of each branch that reaches the pose within the limits.
     """
 
     names: tuple[str, ...]
@@ -48,8 +44,6 @@ class Solved(NamedTuple):
     found: int
     other: Configuration | None
     rolled: int
-    roll: Status
-    rank: int
     goal: str
     postures: dict[str, Configuration]
 
@@ -59,18 +53,16 @@ def solved(robot: Robot) -> Solved:
     """Solve for the pose of home, and for the one that is rolled."""
     names = branch_names(robot)
     T, q = fk(robot, robot.q_home), robot.q_home
-    _, solutions = _exact(robot, T)
+    solutions = _exact(robot, T)
     turns = robot.revolute
     away = [float(np.abs(np.angle(np.exp(1j * (s.q - q)[turns]))).sum()) for s in solutions]
     other = as_configuration(solutions[int(np.argmax(away))].q) if away and max(away) > 1e-3 else None
-    status, rolled = _exact(robot, T @ rotation(2, ROLL))
+    rolled = _exact(robot, T @ rotation(2, ROLL))
     here = branch_of(robot, q) if names else ""
-    point = solve(robot, T[:3, 3], IKOptions(task="position"), q).solutions if robot.n < 6 and names else ()
-    postures = {branch_of(robot, s.q): as_configuration(s.q) for s in (*point, *solutions) if names}
+    postures = {branch_of(robot, s.q): as_configuration(s.q) for s in solutions if names}
     reached = postures.keys() - {here}
     goal = min(sorted(reached), key=lambda name: _parts_apart(name, here), default="")
-    at_home = rank(robot, jacobian(robot, q), NEARLY)
-    return Solved(names, here, len(solutions), other, len(rolled), status, at_home, goal, postures)
+    return Solved(names, here, len(solutions), other, len(rolled), goal, postures)
 
 
 def _parts_apart(one: str, other: str) -> int:
@@ -78,44 +70,33 @@ def _parts_apart(one: str, other: str) -> int:
     return sum(a != b for a, b in zip(one.split(" · "), other.split(" · "), strict=True))
 
 
-def _exact(robot: Robot, T: Array) -> tuple[Status, tuple[IKSolution, ...]]:
-    """The status of a target, and the solutions that meet the whole pose: compromises do not."""
+def _exact(robot: Robot, T: Array) -> tuple[IKSolution, ...]:
+    """The solutions that meet the whole pose: compromises do not."""
     result = solve(robot, T, IKOptions(), robot.q_home)
-    return result.status, result.solutions if result.status is Status.SOLVED else ()
+    return result.solutions if result.status is Status.SOLVED else ()
 
 
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm."""
     found = outline_of("postures", robot, units, facts(robot, units))
+    if loop_of(robot) is None:
+        return found
     steps = (replace(one, question=Round(robot, units)) if one.title == ROUND else one for one in found.steps)
     return replace(found, steps=tuple(steps))
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares."""
-    known, free = solved(robot), free_motions(robot, "pose")
-    signs = max(0, len(known.names).bit_length() - 1)
+    known, loop = solved(robot), loop_of(robot)
     wrong = _others(known)
     numbers = {
-        "joints": robot.n,
         "named": len(known.names),
-        "signs": signs,
-        "every_sign": 2**signs == len(known.names),
+        "signs": max(0, len(known.names).bit_length() - 1),
         "found": known.found,
-        "free": free,
-        "moving": robot.n - free,
         "stretched": distance(fk(robot, robot.q_home), robot.T_world_base) / robot.reach,
         "beyond": BEYOND,
-        "rank_at_home": known.rank,
-        # With fewer joints there may be a single one.
-        "several": free > 0 or known.found > 1 or robot.n >= 6,
-        "another": known.other is not None,
         "rolled": known.rolled,
-        "limits": known.roll is Status.LIMITS,
     }
-    numbers["reachable"] = bool(known.goal)
-    loop = loop_of(robot)
-    numbers["cuspidal"] = loop is not None
     words = {
         "here": known.here,
         "goal_posture": known.goal,
@@ -126,10 +107,6 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     for place in (1, 2, 3):
         words[f"other{place}"], words[f"part{place}"] = wrong.get(place, ("", ""))
     by_hand, by_hand_words = planar.facts(robot, units)
-    functions = {
-        "offered": lambda place: float(int(place) in wrong),
-        "alike": lambda place: float(bool(wrong[int(place)][1])),
-    }
     home = Pose(as_configuration(robot.q_home))
     poses = {"home": home, "another posture": home if known.other is None else Pose(known.other)}
     poses["beyond"] = Pose(home.q, beyond(robot))
@@ -142,7 +119,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     for place in (1, 2, 3):
         q = known.postures.get(wrong.get(place, ("", ""))[0])
         leads[f"other{place}"] = None if q is None else Ghost(q)
-    return LessonFacts(values | by_hand, functions, words | by_hand_words, poses, leads=leads)
+    return LessonFacts(values | by_hand, {}, words | by_hand_words, poses, leads=leads)
 
 
 def beyond(robot: Robot) -> tuple[float, ...]:
@@ -162,15 +139,10 @@ def _meanings(robot: Robot) -> str:
 
 
 def _others(known: Solved) -> dict[int, tuple[str, str]]:
-    """Postures that the arm does not have, by the places of wrong options: their names, and the part that differs.
-
-    If none differs in one part only, those that differ in several; their part is empty.
-    """
+    """Three postures that the arm does not have, by their places: their names, and the only part that differs."""
     here, found = known.here.split(" · "), list[tuple[str, str]]()
     for name in known.names:
         differing = [a for a, b in zip(name.split(" · "), here, strict=True) if a != b]
         if len(differing) == 1:
-            found.append((name, differing[0] if len(here) > 1 else ""))  # of one part nothing else is right
-    found = (found or [(name, "") for name in known.names if name != known.here])[:3]
-    # A single one comes after the right option, more of them around it.
-    return dict(enumerate(found, 1 if len(found) > 1 else 2))
+            found.append((name, differing[0]))
+    return dict(enumerate(found[:3], 1))

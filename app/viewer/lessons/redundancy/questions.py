@@ -45,7 +45,6 @@ def facts(robot: Robot) -> LessonFacts:
         "free": float(free),
         "rank_of_pose": float(robot.n - free),
         "free_point": float(free_motions(robot, "position")),
-        "moves": float(np.any(z)),
         "tool_speed": float(np.linalg.norm(jacobian(robot, robot.q_home) @ z)),
         "slower": float(len(slow)),
         "fastest": float(len(fast)),
@@ -60,7 +59,6 @@ def facts(robot: Robot) -> LessonFacts:
     names = (*(f"{name}{i}" for name in ("slow", "speed") for i in (1, 2, 3)), "fast2")
     functions = {
         "led_to": lambda joint: float(there[int(joint) - 1]),
-        "still": lambda place: float(size[slow[int(place) - 1]] < STILL),
     }
     points, ways = axes_at(robot, robot.q_home)
     chosen = {f"slow{i}": k for i, k in enumerate(slow, 1)} | {f"fast{i}": k for i, k in enumerate(fast, 1)}
@@ -71,29 +69,22 @@ def facts(robot: Robot) -> LessonFacts:
     home = as_configuration(robot.q_home)
     poses = {
         "home": Pose(home, drawing={"swing": False}),
-        "self-motion": Pose(home, drawing={"swing": bool(np.any(z))}),
+        "self-motion": Pose(home, drawing={"swing": True}),
     }
     return LessonFacts(numbers, functions, dict.fromkeys(names, "") | words, poses, leads=leads)
 
 
 @lru_cache(maxsize=64)
 def self_moved(robot: Robot) -> tuple[int, float, Array]:
-    """A joint that a self-motion from home moves by one of `WAYS`, this way, and the configuration ``(n,)`` then.
-
-    It is found by the null space; the joint is −1 if no self-motion moves one so far. Joints that turn only.
-    """
-    home, z = robot.q_home, np.abs(null_vector(robot))
-    if not z.any() or free_motions(robot, "pose") == 0:
-        return -1, 0.0, home
+    """A joint that a self-motion from home moves by one of `WAYS`, this, and the configuration ``(n,)`` then."""
+    z = np.abs(null_vector(robot))
     for way in WAYS:
         for joint in np.argsort(-z, kind="stable").tolist():
-            if not robot.revolute[joint] or z[joint] < STILL:
-                continue
             for end in (ROOM * way, -ROOM * way):
                 found = _led(robot, joint, end)
                 if found is not None and robot.in_limits(found):
                     return joint, way, found
-    return -1, 0.0, home
+    raise AssertionError(f"no self-motion of {robot.id} from home")
 
 
 def _led(robot: Robot, joint: int, end: float) -> Array | None:
@@ -109,11 +100,9 @@ def _led(robot: Robot, joint: int, end: float) -> Array | None:
 
 
 def null_vector(robot: Robot) -> Array:
-    """Joint speeds ``(n,)`` of norm 1 that do not move the tool at home; zeros if there are none."""
+    """Joint speeds ``(n,)`` of norm 1 that do not move the tool at home."""
     J = jacobian(robot, robot.q_home)
     free: Array = np.linalg.svd(J)[2][rank(robot, J, NEARLY) :]
-    if not len(free):
-        return np.zeros(robot.n)
     # Of several, the direction in which a single joint moves most.
     joint = int(np.argmax(np.linalg.norm(free, axis=0)))
     direction: Array = free.T @ free[:, joint]

@@ -28,7 +28,6 @@ from app.viewer.lessons.rotations.turning import FRAME, Turning
 from app.viewer.lessons.rotations.typed import read_rotation
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
-from kin import Robot
 from kin.transforms import Array
 from kin.typed import EntryError
 
@@ -46,13 +45,10 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
     about = "A rotation in all its forms, gimbal lock, and a chain of frames that you build."
     outline = staticmethod(outline)
     settings_of, facts_of = RotationsSettings, RotationsFacts
+    left: ClassVar[Left] = "pose"
     undo: ClassVar[dict[str, str]] = dict.fromkeys(
         ("on_add", "on_remove", "on_swap", "on_clear"), "Chain of frames"
     )
-
-    @staticmethod
-    def left(robot: Robot) -> Left:
-        return "pose"
 
     def started(self) -> None:
         self._figure = FigureNodes(body(self.stage.now.robot).size)

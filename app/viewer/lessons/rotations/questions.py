@@ -60,7 +60,6 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     row, column = _first_entry(R, k, {(i, j), (j, i), (2, 0), (2, 2)})
     between = math.acos(max(-1.0, min(1.0, float(R[row, column]))))
     numbers: dict[str, float | Quantity] = {
-        "upright": np.sort(np.abs(R[:, 2]))[1] < 1e-6,
         "row": row + 1,
         "at": column + 1,
         "exchanged": R[column, row],

@@ -178,13 +178,9 @@ class ScrewsFacts(Facts[ScrewsSettings]):
 class ScrewsAsked(AskedFacts):
     """The arm with all joints at zero, of which the questions are. Joints count from 1."""
 
-    def turns(self, joint: float) -> bool:
-        """Whether a joint turns; it slides otherwise."""
-        return bool(self.robot.revolute[int(joint) - 1])
-
     @cached_property
     def seen(self) -> int:
-        """The last joint that turns, or else joint 1."""
+        """The last joint that turns."""
         return next((i + 1 for i in range(self.robot.n - 1, -1, -1) if self.robot.revolute[i]), 1)
 
     @property
@@ -199,7 +195,7 @@ class ScrewsAsked(AskedFacts):
 
     @property
     def far(self) -> int:
-        """The joint that turns with the axis farthest from the origin of the world; 0: all pass through it."""
+        """The joint that turns with the axis farthest from the origin of the world."""
         return far_joint(self._S) + 1
 
     @property
@@ -229,8 +225,8 @@ class ScrewsAsked(AskedFacts):
         return float(np.abs(self._screw(self.far)[3:]).max())
 
     def foot(self, coordinate: float) -> float:
-        """Coordinate 1, 2 or 3 of the point of the far axis nearest to the origin, m; 0 without one."""
-        return float(foot(self._screw(self.far))[int(coordinate) - 1]) if self.far else 0.0
+        """Coordinate 1, 2 or 3 of the point of the far axis nearest to the origin, m."""
+        return float(foot(self._screw(self.far))[int(coordinate) - 1])
 
     @property
     def slides(self) -> int:
@@ -275,12 +271,11 @@ class ScrewsAsked(AskedFacts):
 
         The point of its axis nearest to the origin has no number of `far_point`.
         """
-        if self.far:
-            for joint in np.argsort(-np.linalg.norm(self._S[3:], axis=0), kind="stable").tolist():
-                nearest = float(np.abs(foot(self._S[:, joint])).max())
-                given = abs(nearest - np.abs(self._point)) <= 0.03 * nearest
-                if joint + 1 != self.far and nearest > 10.0 * LEAST and not given.any():
-                    return int(joint) + 1
+        for joint in np.argsort(-np.linalg.norm(self._S[3:], axis=0), kind="stable").tolist():
+            nearest = float(np.abs(foot(self._S[:, joint])).max())
+            given = abs(nearest - np.abs(self._point)) <= 0.03 * nearest
+            if joint + 1 != self.far and nearest > 10.0 * LEAST and not given.any():
+                return int(joint) + 1
         return self.far
 
     @property
@@ -352,8 +347,7 @@ class ScrewsAsked(AskedFacts):
 
     @property
     def _direction(self) -> Array:
-        S = self._screw(self.seen)
-        return np.asarray(S[:3] if self.turns(self.seen) else S[3:])
+        return self._screw(self.seen)[:3]
 
     @cached_property
     def _point(self) -> Array:

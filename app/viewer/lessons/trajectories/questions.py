@@ -44,7 +44,8 @@ def outline(robot: Robot, units: Units) -> Outline:
 def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares."""
     joint, found, between = example(robot), family(robot), ways(robot)
-    unit, lengths, angles = units.of(bool(robot.revolute[0])), units.lengths, units.angles
+    assert between is not None
+    lengths, angles = units.lengths, units.angles
     past = [turning_past(offset, SPEED, HALF) for offset in OFFSETS]
     share, elbows = both_elbows(START, END, LINKS)
     hertz, decimals = frequency(robot), 0 if units.degrees else 2
@@ -52,11 +53,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     sketch = sketched(robot)
     long, (v, a, _) = LONG * sketch.way, joint.limits.tolist()
     numbers: dict[str, float | Quantity] = {
-        "both": float(between is not None),
         "speed": SPEED,
         "closest": Quantity(OFFSETS[0], "length"),
-        "swings": swings,
-        "turns": float(robot.revolute[0]),
         "sketched": sketch.way,
         "sketch_time": sketch.time,
         "largest": float(joint.limits[0]),
@@ -68,11 +66,11 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     rates = (f"{angles.number(float(rate.max()), decimals)} {angles.name}/s" for _, rate in past)
     words = {
         "joint": joint.name,
-        "way": unit.text(joint.way),
-        "velocity": unit.per_second().text(float(joint.limits[0]), 0),
-        "acceleration": unit.per_second(2).brief(float(joint.limits[1])),
-        "long_way": unit.brief(long),
-        "sketch_way": unit.brief(sketch.way),
+        "way": angles.text(joint.way),
+        "velocity": angles.per_second().text(float(joint.limits[0]), 0),
+        "acceleration": angles.per_second(2).brief(float(joint.limits[1])),
+        "long_way": angles.brief(long),
+        "sketch_way": angles.brief(sketch.way),
         "sketch_seconds": general(sketch.time, 3),
         "duration": f"{found['cubic'].duration:.2f}",
         "speed_shown": lengths.per_second().brief(SPEED),
@@ -88,30 +86,27 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "start": _place(START, units),
         "stop": _place(END, units),
         "blocked": f"{100.0 * float(share[np.argmax(elbows[1] > math.pi)]):.0f}",
-        **dict.fromkeys(("off", "ptp", "lin"), ""),
+        **_compared(between, units),
     }
-    shown = _figures(robot, units)
+    shown = {**_figures(robot, units), "ways": figures.two_ways(between, units)}
     answered = {
-        "time": figures.timed(unit, long, joint.limits),
-        "sketch": figures.sketched(unit, sketch, joint.limits),
+        "time": figures.timed(angles, long, joint.limits),
+        "sketch": figures.sketched(angles, sketch, joint.limits),
     }
-    if between is not None:
-        words |= _compared(between, units)
-        shown["ways"] = figures.two_ways(between, units)
-    return LessonFacts(numbers, {}, words, _poses(robot), shown, leads(between), answered)
+    return LessonFacts(numbers, {}, words, _poses(robot, between), shown, leads(between), answered)
 
 
 def _figures(robot: Robot, units: Units) -> dict[str, Markup]:
     """The charts that are shown with answers."""
-    unit, angles = units.of(bool(robot.revolute[0])), units.angles
+    angles = units.angles
     past = [turning_past(offset, SPEED, HALF) for offset in OFFSETS]
     share, elbows = both_elbows(START, END, LINKS)
     return {
-        "cubic": figures.cubic(robot, unit),
-        "profiles": figures.family_of(robot, unit),
-        "ends": figures.ends(robot, unit),
+        "cubic": figures.cubic(robot, angles),
+        "profiles": figures.family_of(robot, angles),
+        "ends": figures.ends(robot, angles),
         "past the axis": figures.past_axis(past, OFFSETS, units),
-        "load": figures.load(robot, unit),
+        "load": figures.load(robot, angles),
         "elbows": figures.elbows(share, elbows, angles),
     }
 
@@ -126,10 +121,8 @@ def _compared(between: Ways, units: Units) -> dict[str, str]:
     }
 
 
-def leads(between: Ways | None) -> dict[str, Lead | None]:
+def leads(between: Ways) -> dict[str, Lead | None]:
     """The way of the tool on a PTP, the straight line between its ends, and an arc of a circle."""
-    if between is None:
-        return dict.fromkeys(("ptp", "straight", "arc"))
     points = between.ptp.sample(np.linspace(0.0, between.ptp.duration, POINTS)).T[:, :3, 3]
     start, end = points[0], points[-1]
     way = end - start
@@ -141,7 +134,7 @@ def leads(between: Ways | None) -> dict[str, Lead | None]:
     return {name: Path(tuple(map(tuple, each.tolist()))) for name, each in ways.items()}
 
 
-def _poses(robot: Robot) -> dict[str, Pose]:
+def _poses(robot: Robot, between: Ways) -> dict[str, Pose]:
     """Home, joint 1 at both ends of its way, and the ends of the line; the ways are drawn at its end."""
     first, last = joint_ends(robot)
     poses = {
@@ -149,11 +142,9 @@ def _poses(robot: Robot) -> dict[str, Pose]:
         "start of joint 1": Pose(as_configuration(first), drawing={"paths": False}),
         "end of joint 1": Pose(as_configuration(last)),
     }
-    if (between := ways(robot)) is not None:
-        ptp = between.ptp
-        for name, t in (("start of the line", 0.0), ("end of the line", ptp.duration)):
-            q = ptp.derivatives(t)[0]
-            poses[name] = Pose(as_configuration(q), drawing={"paths": t > 0.0})
+    for name, t in (("start of the line", 0.0), ("end of the line", between.ptp.duration)):
+        q = between.ptp.derivatives(t)[0]
+        poses[name] = Pose(as_configuration(q), drawing={"paths": t > 0.0})
     return poses
 
 

@@ -10,22 +10,22 @@ import numpy as np
 
 from app.exports.worksheet.sheet import indexed
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.leads import UP, direction, level
+from app.viewer.lessons.guide.leads import UP, direction
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
 from app.viewer.lessons.guide.poses import as_configuration, distance, first_clear, moved
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
 from kin import Robot, fk, jacobian, singularities
 from kin.axes import NEARLY, joint_axes, size
-from kin.differential.task import lifts, natural_task, rank, task_jacobian, usual_rank
+from kin.differential.task import natural_task, rank, task_jacobian, usual_rank
 from kin.ik import Singularity
 from kin.ik.messages.singularity import short
 from kin.transforms import Array
 from kin.units import Units, general
 
-LOAD, SLOW = 10.0, 1e-3  # N, m/s
+LOAD = 10.0  # N
 SAMPLES, SCANNED = 32, 73  # configurations at random, and along the range of a joint
-BENT, BENT_SLIDE, ANOTHER = (0.6, -0.6, 1.0), 0.2, 0.1  # rad, of the reach, and of the longest semi-axis
+BENT, ANOTHER = (0.6, -0.6, 1.0), 0.1  # rad, and of the longest semi-axis
 FLAT, CLEAR = 0.06, 2.0  # of the largest σ that was found: what counts as none; home has more than twice as much
 
 
@@ -39,50 +39,43 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     home, J = robot.q_home, jacobian(robot, robot.q_home)
     heavy = int(np.argmax([abs(torque(J, k)) for k in range(robot.n)]))
     semi = np.linalg.svd(J[:3], compute_uv=False)
-    axes, there_asked = _axes(robot, home), bent(robot)
+    there_asked = bent(robot)
     U_asked, asked, _ = np.linalg.svd(jacobian(robot, there_asked)[:3])
     found = singular(robot)
+    assert found is not None
     flat = FLAT * max(_smallest(robot, q) for q in robot.random_q(np.random.default_rng(4), SAMPLES))
     there = driven(robot, flat)
+    assert there is not None
     numbers = {
         "last": float(robot.n),
         "load": LOAD,
-        "all_turn": float(robot.revolute.all()),
         "speed": float(np.linalg.norm(J[:3, 0])),
         "from_axis": float(np.linalg.norm(fk(robot, home)[:3, 3] - joint_axes(robot)[0].point)),
-        "turning": float(np.linalg.norm(J[3:, -1])),
         "heavy": heavy + 1.0,
-        "torque": torque(J, heavy) if lifts(robot, J, heavy) else 0.0,
-        "least_torque": 0.25 * LOAD * NEARLY * (size(robot) if robot.revolute[heavy] else 1.0),
+        "torque": torque(J, heavy),
+        "least_torque": 0.25 * LOAD * NEARLY * size(robot),
         "fastest": float(semi[0]),
-        "slowest": float(semi[axes - 1]),
-        "axes": float(axes),
+        "slowest": float(semi[-1]),
         "asked": float(asked[0]),
-        "round": float(asked[:axes].prod() ** (1.0 / axes)),
-        "singular": float(found is not None),
+        "round": float(asked.prod() ** (1.0 / 3.0)),
         "metre": SAMPLE / scale_of(robot, "velocity"),
-        "flattened": float(found is not None and _axes(robot, found[0]) < _axes(robot, home)),
         "flat": round(flat, 4),
-        "drives": float(there is not None),
         "usual": float(usual_rank(robot, natural_task(robot))),
-        "rank_there": float("nan") if found is None else float(rank_of(robot, found[0])),
+        "rank_there": float(rank_of(robot, found[0])),
     }
     functions = {
-        "turns": lambda joint: float(robot.revolute[int(joint) - 1]),
-        "reaches": lambda joint: float((home if there is None else there)[int(joint) - 1]),
-        "lifts": lambda joint: float(lifts(robot, J, int(joint) - 1)),
+        "reaches": lambda joint: float(there[int(joint) - 1]),
     }
     lead = leads(robot, J)
     words = {
         "sigma_home": general(_smallest(robot, home), 3),
-        "others": " and ".join(f"{general(value, 4)} m/s" for value in asked[1:axes]),
-        "product": f"{general(float(asked[:axes].prod()), 4)} {'m²/s²' if axes == 2 else 'm³/s³'}",
-        "singularity": "" if found is None else indexed(short(found[1], units)),
+        "others": " and ".join(f"{general(value, 4)} m/s" for value in asked[1:]),
+        "product": f"{general(float(asked.prod()), 4)} m³/s³",
+        "singularity": indexed(short(found[1], units)),
     }
     poses = {"home": Pose(as_configuration(home)), "bent": Pose(as_configuration(there_asked))}
-    if found is not None:
-        poses["singularity"] = Pose(as_configuration(found[0]))
-    drawn = {"fastest": semi_axis(robot, there_asked, U_asked, asked, axes)}
+    poses["singularity"] = Pose(as_configuration(found[0]))
+    drawn = {"fastest": semi_axis(robot, there_asked, U_asked, asked)}
     return LessonFacts(numbers, functions, words, poses, leads=lead, shapes=drawn)
 
 
@@ -90,14 +83,13 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
 def bent(robot: Robot) -> Array:
     """Home with one joint moved, so that the longest semi-axis is clearly another one ``(n,)``.
 
-    At home the ellipsoid is on show before it is asked about. Where all joints slide it is always the same.
+    At home the ellipsoid is on show before it is asked about.
     """
     at_home, tried = _longest(robot, robot.q_home), list[Array]()
     for joint in range(robot.n):
-        for amount in BENT if robot.revolute[joint] else [BENT_SLIDE * robot.reach]:
+        for amount in BENT:
             q, _ = moved(robot, joint, amount)
-            changed = abs(_longest(robot, q) - at_home) > ANOTHER * at_home
-            if changed and _axes(robot, q) == _axes(robot, robot.q_home):
+            if abs(_longest(robot, q) - at_home) > ANOTHER * at_home:
                 tried.append(q)
     # The farther out the tool is, the less of the arm is in front of the ellipsoid.
     tried.sort(key=lambda q: -distance(robot.T_world_base, fk(robot, q)))
@@ -110,22 +102,18 @@ def _longest(robot: Robot, q: Array) -> float:
     return float(np.linalg.norm(jacobian(robot, q)[:3], 2))
 
 
-def semi_axis(robot: Robot, q: Array, U: Array, semi: Array, axes: int) -> SemiAxis:
+def semi_axis(robot: Robot, q: Array, U: Array, semi: Array) -> SemiAxis:
     """The longest semi-axis of the velocity ellipsoid at q ``(n,)``, and the others."""
-    others = [float(semi[k]) if k < axes else 0.0 for k in (1, 2)]
     ways = tuple(tuple(U[:, k].tolist()) for k in (1, 2, 0))
     scale = SAMPLE / scale_of(robot, "velocity")
     center = tuple(fk(robot, q)[:3, 3].tolist())
-    return SemiAxis(center, ways, (others[0], others[1]), scale)
+    return SemiAxis(center, ways, (float(semi[1]), float(semi[2])), scale)
 
 
 def leads(robot: Robot, J: Array) -> dict[str, Lead | None]:
-    """The ways of the tool point that joint 1 may have; the true one is its velocity."""
+    """The ways of the tool point that joint 1 may have; the level one is its velocity."""
     tool, v = fk(robot, robot.q_home)[:3, 3], J[:3, 0]
-    ways = {"lifts": UP, "level": level(v)}
-    if np.linalg.norm(v) > SLOW:
-        ways["lifts" if lifts(robot, J, 0) else "level"] = v
-    return {name: direction(robot, tool, way) for name, way in ways.items()}
+    return {"lifts": direction(robot, tool, UP), "level": direction(robot, tool, v)}
 
 
 @lru_cache(maxsize=64)
@@ -176,17 +164,11 @@ def _one_joint_away(robot: Robot) -> Iterator[tuple[Array, Singularity]]:
             yield q, near
 
 
-def _axes(robot: Robot, q: Array) -> int:
-    """How many axes the ellipsoid of the tool point's velocities has at q ``(n,)``."""
-    semi = np.linalg.svd(jacobian(robot, q)[:3], compute_uv=False)
-    return int((semi > NEARLY * size(robot)).sum())
-
-
 def rank_of(robot: Robot, q: Array) -> int:
     """The rank of the Jacobian of the arm's task."""
     return rank(robot, task_jacobian(robot, q))
 
 
 def torque(J: Array, joint: int) -> float:
-    """What a joint applies (N·m, or N) to hold a weight of `LOAD` at the tool."""
+    """What a joint applies (N·m) to hold a weight of `LOAD` at the tool."""
     return float(-J[:3, joint] @ np.array([0.0, 0.0, -LOAD]))

@@ -115,7 +115,7 @@ class ArmControls:
         left = self._left.get(robot.id)
         page.change_robot(robot, None if left is None else left.q)
         if left is None:
-            page.lessons.begin()  # the open step is about a pose of this arm
+            page.lessons.begin(keep_arm=True)  # the open step is about a pose of this arm
         page.status.show(introduction(robot))
         if left is not None:
             self._restore_arm(left)

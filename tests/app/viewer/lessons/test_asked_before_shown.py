@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 import pytest
-from arms import CLASSICS
 from fake_browser import FakeBrowser
+from lesson_arms import ASKED, arms_of
 from live_server import serve_viewer
 
 from app.shared.clouds import Clouds
@@ -23,13 +22,13 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Outline
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.server import ViewerServer
-from kin import Robot, jacobian
+from kin import Robot
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE, UNITS = Store(), Units()
-ARMS = [STORE.get(name) for name in ("pioneer5", "ur5", "scara", "puma560")]
+UR5 = STORE.get("ur5")
 KEYS = (
     *("rotations", "screws", "redundancy", "velocity", "trajectories"),
     *("numeric", "postures", "equations", "dh", "inverse"),
@@ -111,14 +110,14 @@ def leaks(server: int, lesson: Any) -> dict[str, list[tuple[str, set[float]]]]:
     """Questions whose answers were on show on at least half of the arms that have them."""
     found: dict[str, list[tuple[str, set[float]]]] = {}
     asked: dict[str, int] = {}
-    for robot in ARMS:
+    for robot in arms_of(lesson.key):
         with FakeBrowser(server) as tab:
             tab.settle()
             tab.choose(robot.name)
             before = set(tab.gui)
             tab.set("Lesson", lesson.title)
             tab.wait(lambda: 'data-guide="steps"' in tab.html)
-            outline = lesson.outline(robot, UNITS)
+            outline = lesson.asked(robot, UNITS)
             for key, each in seen(tab, outline, before):
                 name = key if key.startswith("c") else outline.steps[int(key) - 1].title
                 asked[name] = asked.get(name, 0) + 1
@@ -191,7 +190,7 @@ def given_away(robot: Robot, outline: Outline) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
 def test_the_reason_of_an_estimate_does_not_answer_the_question_after_it(lesson: Any) -> None:
-    for robot in CLASSICS:
+    for robot in arms_of(lesson.key):
         assert not given_away(robot, lesson.outline(robot, UNITS)), robot.id
 
 
@@ -199,7 +198,7 @@ def test_the_reason_of_an_estimate_does_not_answer_the_question_after_it(lesson:
 def test_the_reason_of_an_estimate_speaks_of_what_is_seen(lesson: Any) -> None:
     """Of no symbol, matrix or number of a computation: these are what is asked next."""
     computed = re.compile(r"[₀-₉]|\bp[xyz]\b|\b(column|entry|component|matrix|Jacobian|determinant)\b|\d\.\d{2}")
-    for robot in CLASSICS:
+    for robot in arms_of(lesson.key):
         for step in lesson.outline(robot, UNITS).steps:
             for option in step.estimate.options if isinstance(step.estimate, Choice) else ():
                 assert not computed.search(option.reason), (robot.id, option.reason)
@@ -207,27 +206,15 @@ def test_the_reason_of_an_estimate_speaks_of_what_is_seen(lesson: Any) -> None:
 
 def test_a_reason_that_answers_the_question_after_it_is_found() -> None:
     numeric = next(lesson for lesson in LESSONS if lesson.key == "numeric")
-    outline = numeric.outline(ARMS[1], UNITS)
+    outline = numeric.outline(UR5, UNITS)
     first = outline.steps[0]
     assert isinstance(first.question, Number)
     assert isinstance(first.estimate, Choice)
-    share = round(100.0 * first.question.answer / ARMS[1].reach)
+    share = round(100.0 * first.question.answer / UR5.reach)
     for reason in (f"It is {share} % of the reach.", f"It is {first.question.value_text}."):
         options = tuple(replace(option, reason=reason) for option in first.estimate.options)
         step = replace(first, estimate=replace(first.estimate, options=options))
-        assert given_away(ARMS[1], replace(outline, steps=(step,)))
-
-
-def test_no_self_motion_leaves_the_rank_to_be_asked() -> None:
-    """The reason of the estimate says that there is no self-motion: how many there are is no question then."""
-    redundancy = next(lesson for lesson in LESSONS if lesson.key == "redundancy")
-    for robot in CLASSICS:
-        question = redundancy.outline(robot, UNITS).steps[0].question
-        assert isinstance(question, Number)
-        random = robot.random_q(np.random.default_rng(2), 1)[0]
-        rank = int(np.linalg.matrix_rank(jacobian(robot, random), tol=1e-6))
-        assert ("rank" in question.prompt) == (rank == robot.n), robot.id
-        assert question.answer == (rank if rank == robot.n else robot.n - rank), robot.id
+        assert given_away(UR5, replace(outline, steps=(step,)))
 
 
 @pytest.mark.full
@@ -238,10 +225,9 @@ def test_an_answer_on_show_is_found(server: int, monkeypatch: pytest.MonkeyPatch
 
 
 def test_steps_withhold_facts_that_there_are() -> None:
-    for lesson in LESSONS:
-        for robot in ARMS:
-            outline = lesson.outline(robot, UNITS)
-            named = [step.withheld for step in outline.steps] + [*outline.withheld]
-            assert frozenset().union(*named) <= FACTS.keys()
-            assert len(outline.withheld) <= len(outline.check)
-            assert not any(step.withheld and step.question is None for step in outline.steps)
+    for lesson, robot in ASKED:
+        outline = lesson.outline(robot, UNITS)
+        named = [step.withheld for step in outline.steps] + [*outline.withheld]
+        assert frozenset().union(*named) <= FACTS.keys()
+        assert len(outline.withheld) <= len(outline.check)
+        assert not any(step.withheld and step.question is None for step in outline.steps)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy_arm
 import pytest
-from arms import CLASSICS
+from lesson_arms import ASKED, IDS, arms_of
 
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Outline, Step
@@ -28,8 +28,7 @@ from kin.differential.task import natural_task
 from kin.motion import motion_limits
 from kin.units import Units
 
-SAMPLE = ("ur5", "scara", "planar2r", "redundant7")
-ARMS = [pytest.param(r, id=r.id, marks=[] if r.id in SAMPLE else pytest.mark.slow) for r in CLASSICS]
+EACH = pytest.mark.parametrize(("lesson", "robot"), ASKED, ids=IDS)
 N = r"([−-]?\d+(?:\.\d+)?)"
 POWER = r"([\d.]+(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?)"
 TRIPLE = rf"\({N}, {N}, {N}\)"
@@ -92,20 +91,16 @@ class Iterates:
 
     @property
     def rows(self) -> int:
-        return 6 if self.here.drawing["match"] == "pose" else self.rank_of_points
-
-    @property
-    def rank_of_points(self) -> int:
-        return int(np.linalg.matrix_rank(self.here.J[:3], 1e-6))
+        return 6
 
     def run(self, count: int) -> tuple[list[float], np.ndarray]:
         """Errors before and after each step, and the last Jacobian, with lengths in sizes of the arm."""
-        robot, q, whole = self.here.robot, self.here.q.copy(), self.here.drawing["match"] == "pose"
+        robot, q = self.here.robot, self.here.q.copy()
         T, size, errors = np.array(self.here.drawing["target"]).reshape(4, 4), self.size, []
         for _ in range(count + 1):
             at = numpy_arm.pose(robot, q)
             turn = _rotation_vector(T[:3, :3] @ at[:3, :3].T)
-            e = np.concatenate([(T - at)[:3, 3] / size, turn])[: 6 if whole else 3]
+            e = np.concatenate([(T - at)[:3, 3] / size, turn])
             J = numpy_arm.jacobian(robot, q) * np.where(robot.revolute, 1.0, size)
             J[:3] /= size
             errors.append(float(np.linalg.norm(e)))
@@ -196,7 +191,7 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
     ),
     "numeric": (
         (rf"The tool is at {TRIPLE} mm, its target at {TRIPLE} mm", lambda h, m: mm([*h.T[:3, 3], *aim(h)])),
-        (rf"change {N} components|J is {N} × {N}", lambda h, m: [Iterates(h).rows, Iterates(h).rows, h.robot.n]),
+        (rf"J is {N} × {N}", lambda h, m: [Iterates(h).rows, h.robot.n]),
         (
             rf"the error is {POWER} at the start, then {POWER}, then {POWER}, with",
             lambda h, m: Iterates(h).run(2)[0],
@@ -257,10 +252,6 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (rf"\(θ([₁-₇]) = {N}°\)", lambda h, m: [None, *deg(h.end["₁₂₃₄₅₆₇".index(m[0])])]),
         (
             rf"two semi-axes are {N} m/s and {N} m/s long, and the product of all three is {N} m³/s³",
-            lambda h, m: [*semi_axes(h)[1:], semi_axes(h).prod()],
-        ),
-        (
-            rf"one semi-axis is {N} m/s long, and the product of both is {N} m²/s²",
             lambda h, m: [*semi_axes(h)[1:], semi_axes(h).prod()],
         ),
         (rf"has rank {N}\.", lambda h, m: [task_rank(h, h.q + 0.1)]),
@@ -340,6 +331,7 @@ def rank(J: np.ndarray) -> int:
 
 # The numbers that belong to formulas, names and what does not depend on the arm.
 ALWAYS = (
+    r"For instance over .*$",  # test_loop.py has this way
     r"(?:For instance j|J)oint 1 at .*$",  # test_varied_verbs.py has the answers of these steps
     r"For instance 0, .* 0 (?:°|mm)/s\.",
     r"In order: .*?\)\.",
@@ -369,6 +361,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
         r"from 0 to half|/ ?2\b|\b[01]\b",
     ),
     "numeric": (
+        r"(?:transpose|Newton): (?:\d+ steps|does not arrive)",
         r"½|1/\(?2?λ?σ?\)?|\d+ iterations(?: to \S+)?|needs \d+|misses by [^;]*",
         r"λ = 0(?:\.1)?|σ = 0",
         r"0\.2",
@@ -491,8 +484,6 @@ def component(h: Here) -> float:
 
 def far_axis(h: Here) -> float:
     assert h.step.question is not None
-    if "All axes that turn" in h.step.question.prompt:
-        return float(np.linalg.norm(h.screws[3:, h.robot.revolute], axis=0).max())
     return float(np.linalg.norm(h.screws[3:, int(prompted(h, r"axis of joint (\d+)")[0]) - 1]))
 
 
@@ -533,7 +524,7 @@ ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
     ("equations", "A column from two others"): lambda h: float(
         h.T["xyz".index(prompted(h, r"the ([xyz]) component of n")[0]), 0]
     ),
-    ("redundancy", "Joints and conditions"): lambda h: at_rest(h, 6) or int(np.linalg.matrix_rank(h.J)),
+    ("redundancy", "Joints and conditions"): lambda h: at_rest(h, 6),
     ("redundancy", "Only the point"): lambda h: at_rest(h, 3),
     ("velocity", "A column"): lambda h: float(np.linalg.norm(h.J[:3, 0])),
     ("velocity", "Turning"): lambda h: float(np.linalg.norm(h.J[3:, -1])),
@@ -569,12 +560,12 @@ def place(value: float, *steps: float) -> int:
 ESTIMATES: dict[str, Callable[[Here], int]] = {
     "rotations": lambda h: place(-h.T[2, 2], -0.1, 0.1),
     "numeric": lambda h: place(float(np.linalg.norm(aim(h) - h.T[:3, 3])) / h.robot.reach, 0.1, 0.5),
-    "equations": lambda h: place(-h.T[2, 3], -1e-3, 1e-3),
+    "equations": lambda h: int(abs(h.T[2, 3]) > 1e-3),
     "redundancy": lambda h: int(at_rest(h, 6) == 0),
     "velocity": lambda h: 0 if abs(h.J[2, 0]) > 1e-6 else 1 if float(np.linalg.norm(h.J[:3, 0])) > 1e-3 else 2,
     "trajectories": lambda h: 1,
     "screws": lambda h: (lambda count: 0 if count == 0 else 1 if count < h.robot.n else 2)(upright(h)),
-    "dh": lambda h: (lambda side, up: 0 if up > side else 2 if -up > side else 1)(*from_base(h)),
+    "dh": lambda h: (lambda side, up: 1 if 2.0 * side > abs(up) else 0 if up > 0.0 else 2)(*from_base(h)),
     "postures": lambda h: place(spread(h), 0.5, 0.9),
     "inverse": lambda h: (
         place(float(np.linalg.norm(from_base(h))) / h.robot.reach, 0.5)
@@ -605,6 +596,8 @@ def scenes(robot: Robot, outline: Outline) -> list[Here]:
     assert start is not None
     drawing: dict[str, Any] = dict(start.drawing)
     for at, step in enumerate(outline.steps):
+        if not step.text:  # asked about other arms
+            continue
         pose = outline.pose_of(at)
         assert pose is not None
         drawing |= pose.drawing
@@ -613,14 +606,12 @@ def scenes(robot: Robot, outline: Outline) -> list[Here]:
     return found
 
 
-@pytest.mark.parametrize("robot", ARMS)
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+@EACH
 def test_numbers_in_words_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
     assert [x for h in scenes(robot, lesson.outline(robot, Units())) for x in wrong_numbers(lesson.key, h)] == []
 
 
-@pytest.mark.parametrize("robot", ARMS)
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+@EACH
 def test_answers_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
     for h in scenes(robot, lesson.outline(robot, Units())):
         question, name = h.step.question, (lesson.key, h.step.title)
@@ -634,25 +625,18 @@ def test_answers_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
         assert abs(away) <= slack, (name, question.answer, given)
 
 
-@pytest.mark.parametrize("robot", ARMS)
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
-def test_estimates_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
-    first, *others = scenes(robot, lesson.outline(robot, Units()))
-    assert all(h.step.estimate is None for h in others)
-    if first.step.title == "Which arms":  # this arm is not derived
-        assert first.step.estimate is None
-        return
-    assert isinstance(first.step.estimate, Choice)
-    rights = [i for i, option in enumerate(first.step.estimate.options) if option.right]
-    assert ESTIMATES[lesson.key](first) in rights
-    if lesson.key == "dh":  # near the diagonal one does not see which is more
-        side, up = from_base(first)
-        assert len(rights) == 1 + (0.8 < abs(up) / side < 1.25)
-    else:
+def test_estimates_are_those_of_the_scene(lesson: Any) -> None:
+    for robot in arms_of(lesson.key):
+        first, *others = scenes(robot, lesson.outline(robot, Units()))
+        assert all(h.step.estimate is None for h in others)
+        assert isinstance(first.step.estimate, Choice)
+        rights = [i for i, option in enumerate(first.step.estimate.options) if option.right]
+        assert ESTIMATES[lesson.key](first) in rights
         assert len(rights) == 1
 
 
-@pytest.mark.parametrize("robot", ARMS)
+@pytest.mark.parametrize("robot", arms_of("rotations"), ids=lambda robot: robot.id)
 def test_the_frame_beside_the_arm_is_turned_as_the_words_say(robot: Robot) -> None:
     rotations = next(lesson for lesson in LESSONS if lesson.key == "rotations")
     outline = rotations.outline(robot, Units())
@@ -676,7 +660,7 @@ def test_every_lesson_begins_with_an_estimate() -> None:
 
 
 def test_a_wrong_number_is_found() -> None:
-    robot = CLASSICS[-1]
+    robot = arms_of("rotations")[-1]
     rotations = next(lesson for lesson in LESSONS if lesson.key == "rotations")
     first = scenes(robot, rotations.outline(robot, Units()))[0]
     assert wrong_numbers("rotations", first) == []

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import numpy_arm
 import pytest
-from arms import CLASSICS
+from lesson_arms import ASKED, arms_of
 
 import kin
 from app.exercises import Exercise, builtin_exercises
 from app.viewer.exercises.views import unsaid
-from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Step
 from app.viewer.lessons.inverse.arm import arm_of
 from app.viewer.lessons.inverse.exercise import example, exercise
@@ -21,7 +20,7 @@ from app.viewer.lessons.inverse.questions import outline_of
 from kin import Robot
 from kin.units import Units
 
-OUTLINES = {(lesson.key, robot.id): lesson.outline(robot, Units()) for lesson in LESSONS for robot in CLASSICS}
+OUTLINES = {(lesson.key, robot.id): lesson.outline(robot, Units()) for lesson, robot in ASKED}
 
 
 def words(step: Step) -> str:
@@ -32,21 +31,6 @@ def words(step: Step) -> str:
         if isinstance(question, Choice):
             found += [text for option in question.options for text in (option.text, option.reason)]
     return " ".join(found)
-
-
-@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
-def test_only_an_arm_with_a_sliding_joint_hears_of_one_in_velocity(robot: Robot) -> None:
-    for step in OUTLINES["velocity", robot.id].steps:
-        if step.title in ("A column", "The ellipsoid", "Torques from a force"):
-            said = re.search(r"\bslides?\b|if it slides|\bforce of joint", words(step))
-            assert said is None or not robot.revolute.all(), (step.title, said)
-
-
-def test_a_step_speaks_of_one_joint_by_what_it_does() -> None:
-    for robot in CLASSICS:
-        first = words(OUTLINES["velocity", robot.id].steps[0])
-        assert ("Joint 1 turns at 1 rad/s" in first) == bool(robot.revolute[0]), robot.id
-        assert ("Joint 1 slides at 1 m/s" in first) == (not robot.revolute[0]), robot.id
 
 
 def test_no_step_points_at_what_is_not_there() -> None:
@@ -110,9 +94,7 @@ def axes(robot: Robot) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def test_the_axes_of_two_joints_have_the_names_of_the_scene_and_lie_as_the_answer_says() -> None:
-    for robot in CLASSICS:
-        if robot.n < 2:
-            continue
+    for robot in arms_of("dh"):
         outline, lines = OUTLINES["dh", robot.id], axes(robot)
         for question in (*(step.question for step in outline.steps), *outline.check):
             if not isinstance(question, Choice) or not question.prompt.startswith("How do the axes of joints"):
@@ -125,12 +107,11 @@ def test_the_axes_of_two_joints_have_the_names_of_the_scene_and_lie_as_the_answe
             reason = next(option.reason for option in question.options if option.right)
             angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(z, w)), abs(z @ w)))
             assert float(re.findall(r"between them is ([\d.]+)°", reason)[0]) == pytest.approx(angle, abs=0.051)
-            if robot.revolute[[one - 1, other - 1]].all():
-                n = np.cross(z, w)
-                sine = np.linalg.norm(n)
-                far = abs((r - p) @ n) / sine if sine > 1e-6 else np.linalg.norm(np.cross(r - p, z))
-                stated = float(re.findall(r"distance ([\d.]+) mm", reason)[0])
-                assert stated == pytest.approx(1e3 * far, abs=0.051), robot.id
+            n = np.cross(z, w)
+            sine = np.linalg.norm(n)
+            far = abs((r - p) @ n) / sine if sine > 1e-6 else np.linalg.norm(np.cross(r - p, z))
+            stated = float(re.findall(r"distance ([\d.]+) mm", reason)[0])
+            assert stated == pytest.approx(1e3 * far, abs=0.051), robot.id
 
 
 def test_a_branch_that_ends_is_not_said_to_lead_anywhere() -> None:
@@ -145,13 +126,3 @@ def test_a_branch_that_ends_is_not_said_to_lead_anywhere() -> None:
         assert ("ends at the step" in step.practice) == (branch.q is None), branch.name
         assert isinstance(step.question, Number)
         assert not re.search(r"\d", step.question.method), "the second miss does not say how many"
-
-
-def test_an_arm_that_is_offered_is_given_a_reason() -> None:
-    count = 0
-    for robot in CLASSICS:
-        step = OUTLINES["inverse", robot.id].steps[-1]
-        assert step.title == "Fewer solutions"
-        assert ("Another arm shows it." in step.practice) == bool(step.arm) == (step.question is None)
-        count += bool(step.arm)
-    assert count

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from arms import CLASSICS
 from fake_browser import FakeBrowser
+from lesson_arms import arms_of
 from live_server import serve_viewer
 
 import kin
@@ -26,7 +27,6 @@ from app.viewer.lessons.screws.lesson import (
     PLACES,
     Form,
     ScrewsLesson,
-    far_joint,
     joints,
     partial,
     product,
@@ -39,6 +39,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 STORE = Store()
 UNITS = Units()
 BOTH: tuple[Form, Form] = ("space", "body")
+
+ASKED = pytest.mark.parametrize("robot", arms_of("screws"), ids=lambda robot: robot.id)
 
 
 @pytest.fixture(params=CLASSICS, ids=[robot.id for robot in CLASSICS])
@@ -109,19 +111,16 @@ def test_the_table_and_both_products_agree_with_the_core(robot: kin.Robot, form:
         assert html.count("rgba(0,114,178") == factors
 
 
+@ASKED
 def test_the_body_form_asks_for_a_length_that_is_not_zero(robot: kin.Robot) -> None:
-    """Where any axis is beside the tool point; the length in the space form is a known mistake."""
+    """The length in the space form is a known mistake."""
     step = next(step for step in ScrewsLesson.outline(robot, UNITS).steps if step.title == "Body form")
     assert isinstance(step.question, Number)
-    points, z = axes_at(robot, np.zeros(robot.n))
-    tool = kin.fk(robot, np.zeros(robot.n))[:3, 3]
-    away = np.linalg.norm(np.cross(z, tool - points), axis=1)[robot.revolute]
-    if away.size and away.max() > 0.05 * robot.reach:
-        assert step.question.answer > 0.01 * robot.reach
-        joint = int(re.findall(r"joint (\d+)", step.question.prompt)[0]) - 1
-        space = float(np.linalg.norm(kin.dh.screws(robot).S[3:, joint]))
-        named = [mistake.value for mistake in step.question.mistakes if "space form" in mistake.reason]
-        assert named == [pytest.approx(space)] or abs(space - step.question.answer) < 1e-3
+    assert step.question.answer > 0.01 * robot.reach
+    joint = int(re.findall(r"joint (\d+)", step.question.prompt)[0]) - 1
+    space = float(np.linalg.norm(kin.dh.screws(robot).S[3:, joint]))
+    named = [mistake.value for mistake in step.question.mistakes if "space form" in mistake.reason]
+    assert named == [pytest.approx(space)] or abs(space - step.question.answer) < 1e-3
 
 
 def test_a_wrong_screw_shows_in_the_product() -> None:
@@ -154,6 +153,7 @@ def test_axes_of_one_line_have_ends_apart() -> None:
     assert tips[3].tolist() == [1.0, 0.0, 0.0]
 
 
+@ASKED
 def test_the_questions_by_another_way(robot: kin.Robot) -> None:
     made = ScrewsLesson.outline(robot, UNITS)
     asked = dict(made.questions())
@@ -172,23 +172,20 @@ def test_the_questions_by_another_way(robot: kin.Robot) -> None:
 
     far = asked["2"]
     assert isinstance(far, Number)
-    if far_joint(kin.dh.screws(robot).S) >= 0:
-        point, z = line(int(far.prompt.split("joint ")[1].split()[0]) - 1)
-        assert far.answer == pytest.approx(np.linalg.norm(np.cross(point, z)), abs=1e-12)
-        near = asked["c4"]
-        assert isinstance(near, Number)
-        point, z = line(int(near.prompt.split("joint ")[1].split(",")[0]) - 1)
-        across = point - (point @ z) * z
-        assert near.answer == pytest.approx(across["xyz".index(near.prompt.split("its ")[1][0])], abs=1e-12)
-    else:
-        assert far.answer == 0
-        assert "c4" not in asked
+    point, z = line(int(far.prompt.split("joint ")[1].split()[0]) - 1)
+    assert far.answer == pytest.approx(np.linalg.norm(np.cross(point, z)), abs=1e-12)
+    near = asked["c4"]
+    assert isinstance(near, Number)
+    point, z = line(int(near.prompt.split("joint ")[1].split(",")[0]) - 1)
+    across = point - (point @ z) * z
+    assert near.answer == pytest.approx(across["xyz".index(near.prompt.split("its ")[1][0])], abs=1e-12)
 
     body = asked["5"]
     assert isinstance(body, Number)
     J = kin.jacobian(robot, np.zeros(robot.n))
     joint = int(re.findall(r"joint (\d+)", body.prompt)[0]) - 1
     assert body.answer == pytest.approx(np.linalg.norm(J[:3, joint]), abs=1e-9)
+    asked |= dict(ScrewsLesson.asked(robot, UNITS).questions())
     for key, right in (("3", "ω = 0, v = its direction"), ("c2", "M"), ("c3", "v becomes zero")):
         question = asked[key]
         assert isinstance(question, Choice)

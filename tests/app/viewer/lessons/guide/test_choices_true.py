@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy_arm
 import pytest
-from arms import CLASSICS
+from lesson_arms import arms_of
 from test_choices_act import ARM, CHOICES, FRAME, LINE, choices
 
 import kin
@@ -47,12 +47,8 @@ def up_or_down(z: float, level: float) -> set[str]:
 
 def place_of_the_tool(robot: Robot, step: Step, _: Any) -> set[str]:
     x, y, z = (pose(robot, step) - np.array(robot.base))[:3, 3]
-    sizes = {
-        "More above it than beside it": z,
-        "More beside it": float(np.hypot(x, y)),
-        "More below it than beside it": -z,
-    }
-    return {text for text, size in sizes.items() if ALIKE * size >= max(sizes.values())}
+    above = "Straight above it" if z > 0 else "Straight below it"
+    return {"To the side of it, higher or lower" if np.hypot(x, y) > abs(z) / ALIKE else above}
 
 
 def way_of_z(_: Robot, step: Step, question: Any) -> set[str]:
@@ -102,21 +98,19 @@ def axis_lines(robot: Robot) -> list[tuple[np.ndarray, np.ndarray]]:
 def lying(robot: Robot, _: Step, question: Any) -> set[str]:
     k = int(re.findall(r"joints (\d+)", question.prompt)[0]) - 1
     (p, z), (r, w) = axis_lines(robot)[k : k + 2]
-    slides = not robot.revolute[k : k + 2].all()
     across, between = np.cross(z, w), r - p
     if np.linalg.norm(across) < NEAR:
         apart = np.linalg.norm(np.cross(z, between)) > NEAR
-        return {"They are parallel." if apart or slides else "They are one line."}
-    if abs(between @ across) > NEAR * np.linalg.norm(across) and not slides:
+        return {"They are parallel." if apart else "They are one line."}
+    if abs(between @ across) > NEAR * np.linalg.norm(across):
         return {"They neither meet nor are parallel."}
     return {"They meet at a right angle." if abs(z @ w) < NEAR else "They meet at another angle."}
 
 
 def height(robot: Robot, step: Step, _: Any) -> set[str]:
     z = pose(robot, step)[2, 3]
-    return {
-        "Higher than the origin of the world" if z > 1e-3 else "Lower than it" if z < -1e-3 else "As high as it"
-    }
+    where = "As high as" if abs(z) < 1e-3 else "Higher than" if z > 0 else "Lower than"
+    return {f"{where} the origin of the world"}
 
 
 def column(robot: Robot, step: Step, question: Any) -> set[str]:
@@ -140,10 +134,9 @@ def gap(robot: Robot, step: Step, question: Any) -> set[str]:
     return {question.options[int(part >= 0.1) + int(part > 0.5)].text}
 
 
-def fastest(robot: Robot, step: Step, question: Any) -> set[str] | None:
+def fastest(robot: Robot, step: Step, question: Any) -> set[str]:
     _, s, V = np.linalg.svd(numpy_arm.jacobian(robot, robot.q_home))
-    if robot.n - int((s > NEAR).sum()) != 1:
-        return None
+    assert robot.n - int((s > NEAR).sum()) == 1
     sizes = np.abs(V[-1])
     return {f"Joint {k + 1}" for k in np.flatnonzero(sizes > (1.0 - 1e-3) * sizes.max())}
 
@@ -154,7 +147,7 @@ def motion_of_joint_1(robot: Robot, step: Step, question: Any) -> set[str]:
     return {question.options[0 if abs(v[2]) > 1e-3 else 1 if moves else 2].text}
 
 
-RIGHT: dict[tuple[str, str, str], Callable[[Robot, Step, Any], set[str] | None]] = {
+RIGHT: dict[tuple[str, str, str], Callable[[Robot, Step, Any], set[str]]] = {
     ("rotations", "Columns", "estimate"): lambda robot, step, _: up_or_down(pose(robot, step)[2, 2], 0.1),
     ("rotations", "Order", "question"): way_of_z,
     ("rotations", "Fixed and moving axes", "question"): same_rotation,
@@ -164,8 +157,7 @@ RIGHT: dict[tuple[str, str, str], Callable[[Robot, Step, Any], set[str] | None]]
     ("equations", "Four columns", "estimate"): height,
     ("equations", "Four columns", "question"): column,
     ("inverse", "The wrist centre", "estimate"): lambda robot, step, _: up_or_down(pose(robot, step)[2, 2], 0.3),
-    ("inverse", "The distance", "estimate"): how_far,
-    ("inverse", "Back along the last link", "estimate"): how_far,
+    ("inverse", "From the tool to two links", "estimate"): how_far,
     ("numeric", "The error", "estimate"): gap,
     ("redundancy", "Who moves", "question"): fastest,
     ("velocity", "A column", "estimate"): motion_of_joint_1,
@@ -176,8 +168,9 @@ def test_the_options_that_are_right_are_so_by_numpy() -> None:
     assert RIGHT.keys() == {name for name, how in CHOICES.items() if how in (LINE, FRAME)}
     judged, wrong = set(), []
     for robot, name, step, question, _ in choices():
-        if name not in RIGHT or (expected := RIGHT[name](robot, step, question)) is None:
+        if name not in RIGHT:
             continue
+        expected = RIGHT[name](robot, step, question)
         judged.add(name)
         if (found := {option.text for option in question.options if option.right}) != expected:
             wrong.append((robot.id, name, found, expected))
@@ -196,12 +189,18 @@ def one_row(convention: Any, **values: Any) -> np.ndarray:
     return frames[0]
 
 
+def order_steps() -> list[tuple[Robot, Step]]:
+    """The steps that ask for the order of a row, of both conventions."""
+    lesson = next(each for each in LESSONS if each.key == "dh")
+    found = [(robot, step) for robot in (UR5, CRAIG) for step in lesson.outline(robot, UNITS).steps]
+    return [(robot, step) for robot, step in found if "four motions" in step.title.lower() and step.question]
+
+
 def orders() -> list[Any]:
     """The orders that are asked for: kind, variant, convention and judge."""
     found = []
-    for robot in (UR5, CRAIG):
-        lesson = next(each for each in LESSONS if each.key == "dh")
-        question = lesson.outline(robot, UNITS).steps[1].question
+    for robot, step in order_steps():
+        question = step.question
         assert isinstance(question, Posed)
         found.append(
             pytest.param(question.kind, question.variant, robot.convention, id=f"lesson-{robot.convention}")
@@ -240,9 +239,7 @@ def test_every_order_of_a_row_is_judged_and_drawn_as_forward_kinematics_has_it(
 
 
 def test_a_wrong_order_is_drawn_on_its_way_beside_the_right_one() -> None:
-    for robot in (UR5, CRAIG):
-        lesson = next(each for each in LESSONS if each.key == "dh")
-        step = lesson.outline(robot, UNITS).steps[1]
+    for robot, step in order_steps():
         assert isinstance(step.question, Posed)
         right: Any = step.question.right()
         assert answer_nodes(robot, step, None, closed=False) == []
@@ -259,9 +256,7 @@ def test_a_wrong_order_is_drawn_on_its_way_beside_the_right_one() -> None:
 
 
 def test_the_product_of_a_row_is_not_on_show_while_its_order_is_asked_for() -> None:
-    for robot in (UR5, CRAIG):
-        lesson = next(each for each in LESSONS if each.key == "dh")
-        step = lesson.outline(robot, UNITS).steps[1]
+    for robot, step in order_steps():
         assert step.withheld == {"order"}
         at = place(robot, robot.q_home, 0.0)
         shown, hidden = (views.caption_html(robot, at, UNITS, in_order=on) for on in (True, False))
@@ -272,7 +267,7 @@ def test_the_product_of_a_row_is_not_on_show_while_its_order_is_asked_for() -> N
 
 def test_entries_of_a_rotation_are_drawn_as_the_direction_that_has_them() -> None:
     lesson = next(each for each in LESSONS if each.key == "rotations")
-    for robot in CLASSICS:
+    for robot in arms_of("rotations"):
         steps = lesson.outline(robot, UNITS).steps
         for step, inverse in zip(steps[:2], (False, True), strict=True):
             question, drawn = step.question, step.drawn

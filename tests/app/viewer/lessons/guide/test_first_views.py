@@ -10,11 +10,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from arms import CLASSICS
+from lesson_arms import arms_of
 
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.dh.axes_drawing import room as room_of_axes
 from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Step
 from app.viewer.lessons.rotations.drawing import LENGTH, anchor, room
 from app.viewer.scene.camera import Sphere, view
@@ -143,11 +144,11 @@ def test_the_list_of_what_is_asked_first_is_complete() -> None:
     assert not ASKED.keys() & WHOLE
 
 
-@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
-def test_what_a_lesson_asks_first_and_wrong_answers_are_seen(robot: Robot) -> None:
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_what_a_lesson_asks_first_and_wrong_answers_are_seen(lesson: type[Lesson]) -> None:
     found = {}
-    for lesson in LESSONS:
+    for robot in arms_of(lesson.key):
         step = lesson.outline(robot, Units()).steps[0]
         if wrong := [*faults(lesson.key, robot, step)]:
-            found[lesson.key] = wrong
+            found[robot.id] = wrong
     assert found == {}

@@ -10,9 +10,11 @@ import numpy_arm
 import pytest
 from arms import CLASSICS
 from fake_browser import FakeBrowser
+from lesson_arms import arms_of
 
 import kin
 from app.viewer.lessons.postures import questions
+from app.viewer.lessons.postures.lesson import Postures
 from app.viewer.lessons.postures.loop import (
     LOOKS,
     MOST,
@@ -35,6 +37,7 @@ ARM = kin.get_robot("orthogonal3r")
 HOME = ARM.q_home
 UNITS = Units()
 QUESTION = Round(ARM, UNITS)
+TITLES = ("There and back", "Drive it round")
 
 
 def det(q: np.ndarray) -> float:
@@ -224,20 +227,12 @@ def test_the_line_on_the_map_is_the_way_of_the_tool() -> None:
     assert shown.count("<circle") == map_html(found, None, UNITS).count("<circle") + 1
 
 
-def test_other_arms_are_offered_the_one_that_shows_it() -> None:
-    for robot in (*CLASSICS, kin.get_robot("rrp")):
-        assert loop_of(robot) is None
-        *_, last = questions.outline(robot, UNITS).steps
-        assert (last.title, last.question, last.arm) == ("There and back", None, "orthogonal3r")
-
-
-def test_a_step_is_found_by_its_title_on_another_arm() -> None:
-    two, three = (questions.outline(kin.get_robot(name), UNITS) for name in ("planar2r", "orthogonal3r"))
-    at = next(i for i, step in enumerate(two.steps) if step.title == "There and back")
-    assert three.steps[three.step_like(two, at)].title == "There and back"
-    assert three.step_like(two, len(two.steps)) == len(three.steps), "the check"
-    ring = next(i for i, step in enumerate(two.steps) if step.title == "By hand: the ring")
-    assert three.step_like(two, ring) == ring
+def test_the_steps_are_about_the_arm_that_shows_it() -> None:
+    assert all(loop_of(robot) is None for robot in (*CLASSICS, kin.get_robot("rrp")))
+    for robot in arms_of("postures"):
+        steps = [step for step in Postures.asked(robot, UNITS).steps if step.title in TITLES]
+        assert [step.about for step in steps] == [ARM, ARM]
+        assert all(step.question is not None for step in steps)
 
 
 @pytest.mark.full

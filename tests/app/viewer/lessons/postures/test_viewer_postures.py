@@ -233,7 +233,7 @@ def test_the_cone_contains_the_directions_that_the_solver_reaches() -> None:
 def tab(port: int) -> Iterator[FakeBrowser]:
     with FakeBrowser(port) as opened:
         opened.set("Lesson", "Postures")
-        opened.say("feature", ["guide", ["go", 1], 6])  # the check; the questions before withhold the postures
+        opened.say("feature", ["guide", ["go", 1], 10])  # the check; the questions before withhold the postures
         opened.wait(lambda: "data-posture" in opened.html)
         opened.settle()
         yield opened
@@ -400,6 +400,7 @@ def test_one_click_allows_any_posture(tab: FakeBrowser) -> None:
 
 
 def test_the_cone_is_drawn_for_five_joints_and_can_be_hidden(tab: FakeBrowser) -> None:
+    tab.choose(PIONEER.name)
     patches = [n for n in tab.nodes if "/cone/patch" in n]
     assert len(patches) == 1
     cone = patches[0].rsplit("/", 1)[0]
@@ -425,5 +426,5 @@ def test_invalid_input_changes_nothing(tab: FakeBrowser) -> None:
     for name, value in (("Go", "99"), ("Go", "<b>"), ("Show", "99"), ("Show", ""), ("Show", "x1")):
         tab.set(name, value)
     tab.settle()
-    assert np.allclose(tab.tool_pose(), home(PIONEER), atol=1e-9)
+    assert np.allclose(tab.tool_pose(), home(PUMA), atol=1e-9)
     assert "Something went wrong" not in tab.html

@@ -13,6 +13,7 @@ from arms import CLASSICS
 from fake_browser import FakeBrowser
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lesson_arms import arms_of
 from live_server import serve_viewer
 from scipy.spatial.transform import Rotation
 
@@ -228,7 +229,7 @@ def test_gimbal_lock_is_worded() -> None:
     assert "infinitely many" in locked
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", arms_of("rotations"), ids=lambda robot: robot.id)
 def test_numbers_of_the_questions(robot: Robot) -> None:
     outline = questions.outline(robot, DEGREES)
     pose = outline.steps[0].pose
@@ -255,7 +256,7 @@ def test_numbers_of_the_questions(robot: Robot) -> None:
 def test_the_order_of_two_turns() -> None:
     rights = {
         k: [o.text for o in q.options if o.right]
-        for k, q in questions.outline(ROBOTS[0], DEGREES).questions()
+        for k, q in questions.outline(arms_of("rotations")[0], DEGREES).questions()
         if isinstance(q, Choice)
     }
     z = Rotation.from_euler("ZX", [90, 90], degrees=True).as_matrix()[:, 2]
