@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from app.exercises.lesson_text import texts_of
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.content import texts_of
 from app.viewer.lessons.guide.lesson import Lesson
 from kin import Robot, get_robot
 

@@ -64,6 +64,7 @@ TRUSTED = {
     "app/shared/settings.py": "the operator's settings",
     "app/shared/solver_names.py": "a file of ours",
     "app/viewer/courses/feature.py": "a course of our database",
+    "app/viewer/lessons/guide/labels.py": "code of ours",
     "app/viewer/lessons/inverse/formulas.py": "code of ours",
     "app/viewer/meshes/library/library.py": "a file of ours",
     "app/viewer/meshes/reader.py": "the process that reads meshes",

@@ -184,6 +184,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/bodies.py": {"kin", "app.viewer.meshes"},
     "app/cli/page.py": {"kin", "app.cli", "app.exports", "app.viewer.scene.bodies", "app.viewer.takehome"},
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
+    "app/cli/classroom/lessons.py": {"kin", "app.cli", "app.exercises", "app.viewer.lessons"},
     "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},
     "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.shared.threads.confined", "app.cli.xacro"},

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import tomllib
 from argparse import Namespace
-from collections import Counter
 from pathlib import Path
 
 import kin
@@ -18,7 +17,7 @@ from app.cli.terminal import Notation, print_json, robot_of, table
 from app.cli.xacro import expanded, is_xacro
 from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
 from app.exercises.exercise import CHECKED_SEEDS
-from app.exercises.lesson_text import load_lesson
+from app.exercises.lessons import LESSONS
 from app.exports.robots import file_name, robot_file
 from app.shared.answers.examination import TITLES, examination_answer, outcome
 from app.shared.answers.exchange import import_answer
@@ -121,7 +120,9 @@ def run_check(arguments: Namespace) -> int:
     path = Path(arguments.file)
     if path.suffix == ".toml" and (meant := _meant(path)):
         if meant == "lesson":
-            return _check_lesson(path, arguments.json)
+            from app.cli.classroom.lessons import check_lesson  # with the viewer, which takes a second
+
+            return check_lesson(path, arguments.json)
         if meant == "course":
             return check_course(path, arguments.robots, os.environ.get("KINBOARD_EXERCISES"), arguments.json)
         return _check_exercise(path, arguments.robots, arguments.json)
@@ -182,7 +183,7 @@ def _about(answer: InspectionAnswer, units: Notation) -> list[str]:
 def _meant(path: Path) -> str:
     """What a file is meant as; empty: a robot.
 
-    A robot file has rows, an exercise an answer, a course items, the texts of a lesson steps.
+    A robot file has rows, an exercise an answer, a course items, the texts of a lesson steps, or the name of one.
     """
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
@@ -192,23 +193,11 @@ def _meant(path: Path) -> str:
         return ""
     if "steps" in data:
         return "lesson"
-    return (
-        "exercise" if "kind" in data or "answer" in data else "course" if data.keys() & {"item", "items"} else ""
-    )
-
-
-def _check_lesson(path: Path, as_json: bool) -> int:
-    """Read the texts of a lesson: which steps and questions there are, and which facts they use."""
-    lesson = load_lesson(path)
-    questions = [*(step.questions for step in lesson.steps if step.questions), *lesson.check]
-    kinds = Counter(alternatives[0].kind.name for alternatives in questions)
-    if as_json:
-        found = {"steps": len(lesson.steps), "check": len(lesson.check), "kinds": kinds, "facts": lesson.facts}
-        return print_json({**found, "poses": sorted(lesson.poses)})
-    print(f"{len(lesson.steps)} steps, and {len(lesson.check)} questions in the check.")
-    print(f"Questions: {', '.join(f'{count} × {name}' for name, count in sorted(kinds.items()))}.\n")
-    print(table(["fact", "what it is"], [[name, about] for name, about in sorted(lesson.facts.items())]))
-    return 0
+    if "kind" in data or "answer" in data:
+        return "exercise"
+    if data.keys() & {"item", "items"}:
+        return "course"
+    return "lesson" if path.name.partition(".")[0] in LESSONS else ""
 
 
 def _check_exercise(path: Path, robots: str | None, as_json: bool) -> int:

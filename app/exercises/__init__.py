@@ -10,7 +10,7 @@ from app.exercises.exercise import TOPICS, Exercise, VariantError
 from app.exercises.fields import ExerciseFileError
 from app.exercises.files import builtin_exercises, load_exercise, load_folder, parse_exercise
 from app.exercises.questions import Asked, Verdict
-from app.exercises.shelf import Exercises, Shelf
+from app.exercises.shelf import Exercises, Lessons, Shelf
 from app.exercises.trial import Student, Trial, tried
 from app.exercises.variant import Variant
 
@@ -21,6 +21,7 @@ __all__ = [
     "ExerciseFileError",
     "Exercises",
     "Kind",
+    "Lessons",
     "Shelf",
     "Student",
     "Trial",

@@ -27,13 +27,23 @@ class ExerciseFileError(KinematicsError):
     def __init__(self, file: str, field: str, value: object, expected: str) -> None:
         self.file, self.field, self.expected = file, field, expected
         self.value = shorten(value)
-        super().__init__(f"{file}: {field}: got {self.value}, expected {expected}")
+        said = f"{file}: {field}: got {self.value}, expected {expected}"
+        super().__init__(said if said.isprintable() else "".join(map(_visible, said)))
+
+
+def _visible(char: str) -> str:
+    """A character of a message: names of fields may be the file's own."""
+    return char if char.isprintable() else char.encode("unicode_escape").decode()
 
 
 def text_of(path: Path | str) -> str:
     """The text of a file; raises `ExerciseFileError`."""
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        with Path(path).open("rb") as file:
+            given = file.read(LIMITS.size + 1)
+        if len(given) > LIMITS.size:
+            raise ExerciseFileError(str(path), "file", "a longer one", f"at most {LIMITS.size} bytes")
+        return given.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
 

@@ -45,16 +45,33 @@ An `example` is worked on an arm of its own: :mod:`app.exercises.worked`.
 
 Texts may be lists of alternatives with `when`, and so may questions. Steps and questions of the check with `when`
 are left out where it does not hold.
+
+A file of the operator's is such a file, in place of the lesson's own, or it has other words for some of its texts:
+the texts by the titles of the steps (`translated`). Labels of the lesson's controls are by those of the code::
+
+    title = "Geschwindigkeit"
+
+    [steps."A column"]
+    "A column" = "Eine Spalte"
+
+    [check]
+    "They slow down" = "Sie werden langsamer"
+
+    [controls]
+    "Ellipsoid" = "Ellipsoid"
 """
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from functools import cache, partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import kin
 from app.exercises.contract import Kind
@@ -62,9 +79,10 @@ from app.exercises.expressions import Expression
 from app.exercises.fields import ExerciseFileError, Fields, Words, text_of, toml_of
 from app.exercises.kinds import KINDS
 from app.exercises.kinds.choice import ChoiceKind
-from app.exercises.lessons import LESSONS
+from app.exercises.lessons import ENGLISH, LANGUAGES, LESSONS
 from app.exercises.variant import Facts
 from app.exercises.worked import WorkedText, read_worked
+from kin.errors import shorten
 
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
 MOST_JOINTS = 12
@@ -74,12 +92,35 @@ FACTS, DRAWN = "AskedFacts", ("poses", "leads")  # the class that lessons derive
 NO_FACTS: Mapping[str, str] = MappingProxyType({})
 _NONE = ""  # the name of no pose and of no figure
 
+# Fields of a lesson whose texts students read. Other texts are names, numbers and expressions.
+SAID = frozenset(
+    (
+        "labels",
+        "larger",
+        "method",
+        "name",
+        "practice",
+        "prompt",
+        "reason",
+        "shown",
+        "text",
+        "then",
+        "title",
+        "wrong",
+    )
+)
+_WORD = re.compile(r"[^\W\d_₀-₉]{2}")
+_BRACES = re.compile(r"\{[^{}]*\}")
+
+Place = tuple[str, ...]  # of a text: ("lesson",), ("steps", title), ("check",) or ("example",)
+
 
 @dataclass(frozen=True)
 class QuestionText:
     """A question: when it is asked, its prompt, its kind with its fields, and the facts that it withholds.
 
     Attributes:
+        at: where in the file, for messages.
         leads: of a choice, names of where its options lead, in the order of the file; `NO_PREVIEW` for those that
             do not. Empty: it is not drawn.
     """
@@ -89,6 +130,7 @@ class QuestionText:
     kind: Kind
     withheld: frozenset[str]
     leads: tuple[str, ...] = ()
+    at: str = ""
 
 
 @dataclass(frozen=True)
@@ -115,6 +157,7 @@ class StepText:
             length as a bar; or the shape of this name.
         arms: ids of the arms that it is asked about; empty: those of the lesson.
         answered: the name of a figure of the answer.
+        at: where in the file, for messages.
     """
 
     when: Expression
@@ -130,9 +173,31 @@ class StepText:
     drawn: tuple[str, int] | BarText | str | None
     arms: tuple[str, ...]
     answered: str = _NONE
+    at: str = ""
 
 
 @dataclass(frozen=True)
+class Translation:
+    """What has become of other words for a lesson.
+
+    Attributes:
+        language: one of `LANGUAGES`.
+        said: what is said in place of each text, by place; "": nothing yet.
+        strays: refusals of words for what the lesson does not have: it may have had it in an earlier version.
+    """
+
+    language: str
+    said: Mapping[Place, Mapping[str, str]]
+    strays: tuple[ExerciseFileError, ...]
+
+    @property
+    def missing(self) -> dict[Place, list[str]]:
+        """The texts of which nothing is said yet, by place."""
+        found = {place: [text for text, said in texts.items() if not said] for place, texts in self.said.items()}
+        return {place: texts for place, texts in found.items() if texts}
+
+
+@dataclass(frozen=True, eq=False)
 class LessonText:
     """A lesson's file.
 
@@ -143,6 +208,10 @@ class LessonText:
         words: names for texts that depend on facts.
         check: each question as alternatives.
         example: what is shown before anything is asked.
+        data: what the file holds.
+        controls: words for the labels of its controls.
+        title, about: in place of those of the lesson's code, if they are given.
+        translation: of a text in other words.
     """
 
     file: str
@@ -153,6 +222,11 @@ class LessonText:
     steps: tuple[StepText, ...]
     check: tuple[tuple[QuestionText, ...], ...]
     example: WorkedText
+    data: Mapping[str, Any]
+    controls: Mapping[str, str]
+    title: str = ""
+    about: str = ""
+    translation: Translation | None = None
 
     @property
     def every_arm(self) -> tuple[str, ...]:
@@ -180,7 +254,10 @@ def parse_lesson(text: str, file: str = "lesson", facts: Mapping[str, str] = NO_
         ExerciseFileError: naming the file, the field, the value and what would be valid.
     """
     data = toml_of(text, file)
-    facts = {**facts, **_facts(Fields(file, data.get("facts", {}), "facts."))}
+    return _lesson(data, file, {**facts, **_facts(Fields(file, data.get("facts", {}), "facts."))})
+
+
+def _lesson(data: Mapping[str, Any], file: str, facts: Mapping[str, str]) -> LessonText:
     found: list[Expression] = []
     aliases = _Fields(file, data.get("words", {}), "words.", frozenset(facts), found)
     words = {name: aliases.words(name) for name in aliases.table}
@@ -189,8 +266,11 @@ def parse_lesson(text: str, file: str = "lesson", facts: Mapping[str, str] = NO_
     steps = tuple(_step(item) for item in fields.tables("steps", 1))
     check = tuple(_alternatives(item) for item in fields.tables("check", 1))
     example = read_worked(fields.sub("example"))
-    arms = _arms(fields, 1)
-    lesson = LessonText(file, fields.words("goal"), arms, facts, words, steps, check, example)
+    title, about, arms = fields.text("title", ""), fields.text("about", ""), _arms(fields, 1)
+    lesson = LessonText(
+        *(file, fields.words("goal"), arms, facts, words, steps, check, example),
+        *(data, _controls(fields), title, about),
+    )
     fields.done()
     known = frozenset(facts) | frozenset(Facts(one := kin.get_robot("ur5"), one.q_home))
     for expression in found:
@@ -218,10 +298,154 @@ def facts_of(module: Path) -> dict[str, str]:
     }
 
 
+@cache
 def lesson_files() -> dict[str, Path]:
     """The files of the lessons that have one, by key."""
     folder = Path(__file__).parents[1] / "viewer" / "lessons"
     return {key: path for key in LESSONS if (path := folder / key / "lesson.toml").exists()}
+
+
+@cache
+def texts_of(lesson: str) -> LessonText:
+    """The texts of a lesson of ours."""
+    return load_lesson(lesson_files()[lesson])
+
+
+def named(path: Path) -> tuple[str, str]:
+    """The lesson and the language of a file of the operator's, by its name: velocity.toml, velocity.de.toml.
+
+    Raises:
+        ExerciseFileError: it is not named like that.
+    """
+    lesson, *more = path.name.removesuffix(".toml").split(".")
+    if lesson not in LESSONS:
+        valid = f"a lesson, as in velocity.toml or velocity.de.toml: {', '.join(LESSONS)}"
+        raise ExerciseFileError(str(path), "name of the file", lesson, valid)
+    if len(more) > 1 or more == [ENGLISH] or not LANGUAGES.keys() >= {*more}:
+        others = ", ".join(code for code in LANGUAGES if code != ENGLISH)
+        valid = f"the code of a language, {others}; or none, for English words"
+        raise ExerciseFileError(str(path), "name of the file", ".".join(more), valid)
+    return lesson, (*more, ENGLISH)[0]
+
+
+def load_words(path: Path, base: LessonText, language: str = ENGLISH) -> LessonText:
+    """The texts of a lesson in a file of the operator's: questions of its own, or `base` in other words.
+
+    Raises:
+        ExerciseFileError: naming the file, the field, the value and what would be valid.
+    """
+    file = str(path)
+    data = toml_of(text_of(path), file)
+    if not isinstance(data.get("steps"), list):
+        return _translated(data, file, base, language)
+    declared = Fields(file, data.get("facts", {}), "facts.")
+    if unknown := sorted(_facts(declared).keys() - base.facts.keys()):
+        raise declared.refuse(unknown[0], unknown[0], f"a fact of the lesson: {', '.join(sorted(base.facts))}")
+    lesson, known = _lesson(data, file, base.facts), base.every_arm
+    if others := [arm for arm in lesson.every_arm if arm not in known]:
+        raise ExerciseFileError(file, "arms", others[0], f"arms of the lesson: {', '.join(known)}")
+    return replace(lesson, translation=Translation(language, {}, ()))
+
+
+class _Said(_Fields):
+    """A table of texts of a lesson, and what is said in their place; nothing yet where that is empty."""
+
+    def refuse(self, field: str, value: object, expected: str) -> ExerciseFileError:
+        return super().refuse(shorten(field, 60), value, expected)
+
+    def said(self, original: str) -> str:
+        """What is said in place of a text; "": nothing."""
+        return self.text(original) if self.get(original) not in (None, "") else ""
+
+    def strays(self) -> list[ExerciseFileError]:
+        """Refusals of texts that the lesson does not have here."""
+        found, known = [], self._read
+        for original in self.table:
+            if original not in known:
+                near = get_close_matches(original, known, 1)
+                hint = f", such as {shorten(near[0], 200)}" if near else ""
+                found.append(self.refuse(original, self.table[original], f"a text that the lesson has here{hint}"))
+        return found
+
+
+def _translated(data: dict[str, Any], file: str, base: LessonText, language: str) -> LessonText:
+    """`base` with the words of a file in place of its own."""
+    fields = _Said(file, data)
+    names, computed = frozenset((*base.facts, *base.words)), frozenset(base.example.quantities)
+
+    def table(*place: str, parent: Fields = fields) -> _Said:
+        given = parent.get(place[-1])
+        own = computed if place == ("example",) else names
+        return _Said(file, {} if given is None else given, f"{parent.prefix}{place[-1]}.", own)
+
+    steps, titles = fields.sub("steps"), [_title(step) for step in base.data["steps"]]
+    tables: dict[Place, _Said] = {(name,): table(name) for name in ("lesson", "check", "example")}
+    tables |= {("steps", title): table("steps", title, parent=steps) for title in titles}
+    texts: dict[Place, dict[str, str]] = {}
+
+    def say(place: Place, original: str) -> str:
+        said = tables[place].said(original)
+        if has_words(original):
+            texts.setdefault(place, {})[original] = said
+        return said or original
+
+    title, about, controls = fields.said("title"), fields.said("about"), _controls(fields)
+    fields.done()
+    lesson = _lesson(_in_words(base.data, say), file, base.facts)
+    valid = "the title of a step: " + ", ".join(titles)
+    strays = [steps.refuse(one, one, valid) for one in steps.table if one not in titles]
+    strays += [stray for each in tables.values() for stray in each.strays()]
+    return replace(
+        lesson,
+        title=title or base.title,
+        about=about or base.about,
+        controls={**base.controls, **controls},
+        translation=Translation(language, texts, tuple(strays)),
+    )
+
+
+def in_language(base: LessonText, language: str) -> LessonText:
+    """A lesson in a language in which it has no words yet."""
+    return _translated({}, base.file, base, language)
+
+
+def has_words(text: str) -> bool:
+    """Whether there is something to translate in a text: not only symbols and names in braces."""
+    return _WORD.search(_BRACES.sub("", text)) is not None
+
+
+def _in_words(data: Mapping[str, Any], say: Callable[[Place, str], str]) -> dict[str, Any]:
+    """The data of a lesson with what `say` makes of each text, by its place."""
+    general = partial(say, ("lesson",))
+    return {
+        **data,
+        "goal": _spoken(data["goal"], general, "text"),
+        "words": {name: _spoken(each, general, "text") for name, each in data.get("words", {}).items()},
+        "steps": [_spoken(step, partial(say, ("steps", _title(step)))) for step in data["steps"]],
+        **{name: _spoken(data[name], partial(say, (name,))) for name in ("check", "example")},
+    }
+
+
+def _spoken(node: Any, say: Callable[[str], str], field: str = "") -> Any:
+    """A value of a field with what `say` makes of the texts in it."""
+    if isinstance(node, dict):
+        return {name: _spoken(each, say, name) for name, each in node.items()}
+    if isinstance(node, list):
+        return [_spoken(each, say, field) for each in node]
+    return say(node) if isinstance(node, str) and field in SAID else node
+
+
+def _title(step: Mapping[str, Any]) -> str:
+    """The title of a step; of alternatives, the last one."""
+    title = step["title"]
+    return str(title if isinstance(title, str) else title[-1])
+
+
+def _controls(fields: Fields) -> dict[str, str]:
+    """Words for labels of controls."""
+    given = fields.get("controls")
+    table = _Said(fields.file, {} if given is None else given, "controls.")
+    return {label: said for label in table.table if (said := table.said(label))}
 
 
 def _facts(fields: Fields) -> dict[str, str]:
@@ -249,6 +473,7 @@ def _step(fields: Fields) -> StepText:
         _drawn(fields.sub("drawn")) if fields.has("drawn") else None,
         _arms(fields),
         fields.text("answered", _NONE),
+        fields.prefix,
     )
     fields.done()
     return step
@@ -307,7 +532,7 @@ def _question(fields: Fields) -> QuestionText:
     prompt, when = fields.words("prompt"), fields.expression("when", "1")
     withheld = frozenset(fields.texts("withheld"))
     read = kind.read(fields)
-    question = QuestionText(when, prompt, read, withheld, _leads(fields, read))
+    question = QuestionText(when, prompt, read, withheld, _leads(fields, read), fields.prefix)
     fields.done()
     return question
 

@@ -20,3 +20,13 @@ LESSONS: Final = (
     "velocity",
     "trajectories",
 )
+
+ENGLISH: Final = "en"
+_LANGUAGES = (
+    "en English, bg Български, cs Čeština, da Dansk, de Deutsch, el Ελληνικά, es Español, et Eesti, fi Suomi, "
+    "fr Français, hi हिन्दी, hr Hrvatski, hu Magyar, it Italiano, ja 日本語, ko 한국어, lt Lietuvių, lv Latviešu, "
+    "nl Nederlands, no Norsk, pl Polski, pt Português, ro Română, sk Slovenčina, sl Slovenščina, sr Српски, "
+    "sv Svenska, tr Türkçe, uk Українська, vi Tiếng Việt, zh 中文"
+)
+# Languages that files may translate lessons into: their own names, by their codes of ISO 639-1.
+LANGUAGES: Final[dict[str, str]] = dict(each.split(" ", 1) for each in _LANGUAGES.split(", "))

@@ -1,8 +1,9 @@
-"""The exercises that a service offers, and those that one page has besides.
+"""The exercises that a service offers, and those that one page has besides; the texts of its lessons.
 
-The operator's folder may grow while the service runs: pages save exercises in it, and the operator copies files
-into it. Each process looks at the folder again when it is asked for the list, and when it does not know an id, and
-reads the files that have changed. It keeps what it has read: a folder that goes away takes nothing from a class.
+The operator's folders may grow while the service runs: pages save exercises in one, and the operator copies files
+into them. Each process looks at a folder again when it is asked for what is in it, and when it does not know an
+id, and reads the files that have changed. It keeps what it has read: a folder that goes away takes nothing from a
+class.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,16 +22,18 @@ from app.exercises import form
 from app.exercises.exercise import TOPICS, Exercise
 from app.exercises.fields import ExerciseFileError
 from app.exercises.files import Find, builtin_exercises, load_exercise, load_folder, parse_exercise
+from app.exercises.lesson_text import LessonText, in_language, lesson_files, load_words, named, texts_of
+from app.exercises.lessons import ENGLISH, LANGUAGES
 from kin import InputError, get_robot
 from kin.parsing import has_comments
 
-EVERY = 1.0  # s between two looks at the folder for the list
+EVERY = 1.0  # s between two looks at a folder
 STALE = 60.0  # s after which a file that was being written was left behind by a process that has ended
 MOST_FILES = 500  # in the folder: with more, pages save no further ones
 _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")  # Windows takes a file of this name for a device
 
 log = logging.getLogger("kinboard.exercises")
-_reading = threading.RLock()  # of the folder; not an attribute, because processes are sent the exercises
+_reading = threading.RLock()  # of the folders; not an attribute, because processes are sent the exercises
 
 
 class _Stamp(NamedTuple):
@@ -39,6 +42,31 @@ class _Stamp(NamedTuple):
     time: int
     size: int
     file: int
+
+
+class _Folder:
+    """The TOML files of a folder, of which it is known when each was changed."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.stamps = _stamps(path) if path.is_dir() else {}
+        self._looked = time.monotonic()
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the last look was some time ago."""
+        return time.monotonic() - self._looked >= EVERY
+
+    def changed(self) -> list[str]:
+        """The names of files that are new, or have changed since the last look."""
+        self._looked = time.monotonic()
+        before, self.stamps = self.stamps, dict[str, _Stamp]()
+        try:
+            self.stamps = _stamps(self.path)
+        except OSError as error:
+            if before:
+                log.warning("%s: what was read of it stays: %s", self.path, error.strerror)
+        return sorted(name for name, stamp in self.stamps.items() if before.get(name) != stamp)
 
 
 class Exercises:
@@ -53,8 +81,7 @@ class Exercises:
 
     def __init__(self, folder: Path | None = None, find: Find = get_robot) -> None:
         self.folder, self._find = folder, find
-        self._stamps = {} if folder is None or not folder.is_dir() else _stamps(folder)
-        self._looked = time.monotonic()
+        self._files = None if folder is None else _Folder(folder)
         own = () if folder is None else load_folder(folder, find)
         self._builtin = {exercise.id: exercise for exercise in builtin_exercises()}
         for exercise in own:
@@ -65,7 +92,7 @@ class Exercises:
     @property
     def all(self) -> tuple[Exercise, ...]:
         """In the order of the list."""
-        if self.folder is not None and time.monotonic() - self._looked >= EVERY:
+        if self._files is not None and self._files.is_due:
             self._look()
         return self._all
 
@@ -151,31 +178,21 @@ class Exercises:
         path = self.folder / f"{name}.toml"
         if os.path.lexists(path):
             raise InputError("id", name, "an id that no other exercise has: a file of the folder has this name")
-        if len(self._stamps) >= MOST_FILES:
-            raise InputError("folder", f"{len(self._stamps)} exercises", f"at most {MOST_FILES}")
+        if self._files is not None and (count := len(self._files.stamps)) >= MOST_FILES:
+            raise InputError("folder", f"{count} exercises", f"at most {MOST_FILES}")
         return path
 
     def _look(self) -> None:
         """Read what has changed in the folder. Files that are invalid are left out, with a line in the log."""
-        if self.folder is None:
+        if self._files is None:
             return
         with _reading:
-            self._looked = time.monotonic()
-            try:
-                stamps = _stamps(self.folder)
-            except OSError as error:
-                if self._stamps:
-                    log.warning("%s: what was read of it stays: %s", self.folder, error.strerror)
-                self._stamps = {}
-                return
-            changed = sorted(name for name, stamp in stamps.items() if self._stamps.get(name) != stamp)
-            self._stamps = stamps
-            if not changed:
+            if not (changed := self._files.changed()):
                 return
             own = dict(self._own)
             for name in changed:
                 try:
-                    one = load_exercise(self.folder / name, self._find)
+                    one = load_exercise(self._files.path / name, self._find)
                     other = self._by_id.get(one.id) or own.get(one.id)
                     if other is not None and Path(other.file).name != name and Path(other.file).exists():
                         raise ExerciseFileError(one.file, "id", one.id, "an id that no other exercise has")
@@ -231,6 +248,94 @@ class Shelf(Exercises):
     def _is_builtin(self, exercise_id: str) -> bool:
         one = self._known.get(exercise_id)
         return one is not None and one.builtin
+
+
+class Lessons:
+    """The texts of the lessons: ours, and those of the operator's folder. Thread-safe.
+
+    A file that is invalid is left out, with a line in the log, and so are words for what its lesson does not have.
+
+    Attributes:
+        language: of pages that have chosen none.
+
+    Raises:
+        ExerciseFileError: the folder cannot be read.
+        InputError: there is nothing in this language.
+    """
+
+    def __init__(self, folder: Path | None = None, language: str = ENGLISH) -> None:
+        self.language = language
+        self._paths: dict[tuple[str, str], Path] = {}  # by lesson and language
+        self._own: dict[tuple[str, str], LessonText] = {}
+        self._bare: dict[tuple[str, str], LessonText] = {}  # without a file, in a language that others have
+        self._files = None if folder is None else _Folder(folder)
+        if self._files is not None and not self._files.path.is_dir():
+            raise ExerciseFileError(str(folder), "folder", "none", "a folder that can be read")
+        if self._files is not None:
+            self._take([*self._files.stamps])
+        if language not in self.languages:
+            raise InputError("KINBOARD_LANGUAGE", language, f"one of {', '.join(self.languages)}")
+
+    @property
+    def languages(self) -> Mapping[str, str]:
+        """The names of the languages that there are, by their codes."""
+        known = {ENGLISH, *(language for _, language in self._paths)}
+        return {code: name for code, name in LANGUAGES.items() if code in known}
+
+    def spoken(self, language: str) -> str:
+        """The language that a page shows which has chosen this one, or none: ""."""
+        return language if language in self.languages else self.language
+
+    def own(self, lesson: str, language: str = "") -> LessonText | None:
+        """The texts of a lesson in a file of the operator's; None: it has none in this language."""
+        if self._files is not None and self._files.is_due:
+            with _reading:
+                self._take(self._files.changed())
+        return self._own.get((lesson, self.spoken(language)))
+
+    def text(self, lesson: str, language: str = "") -> LessonText | None:
+        """The texts of a lesson, as far as they are translated; None of a lesson without a file."""
+        if (own := self.own(lesson, language)) is not None or lesson not in lesson_files():
+            return own
+        key = lesson, self.spoken(language)
+        if key[1] == ENGLISH:
+            return texts_of(lesson)
+        if key not in self._bare:
+            self._bare[key] = in_language(self._original(lesson), key[1])
+        return self._bare[key]
+
+    def _original(self, lesson: str) -> LessonText:
+        return self._own.get((lesson, ENGLISH)) or texts_of(lesson)
+
+    def _take(self, names: Iterable[str]) -> None:
+        """Read files, and with them all others of their lessons: translations are those of the original."""
+        changed = set[str]()
+        for name in names:
+            assert self._files is not None
+            path = self._files.path / name
+            try:
+                key = named(path)
+            except ExerciseFileError as error:
+                log.warning("a file is no lesson: %s", error)
+            else:
+                self._paths[key] = path
+                changed.add(key[0])
+        for key, path in sorted(self._paths.items(), key=lambda one: one[0][1] != ENGLISH):
+            if key[0] in changed:
+                self._read(key, path)
+
+    def _read(self, key: tuple[str, str], path: Path) -> None:
+        lesson, language = key
+        self._bare = {other: text for other, text in self._bare.items() if other[0] != lesson}
+        try:
+            text = load_words(path, texts_of(lesson) if language == ENGLISH else self._original(lesson), language)
+        except ExerciseFileError as error:
+            log.warning("the words of a lesson are left out: %s", error, extra={"kind": path.name})
+            return
+        self._own[key] = text
+        if text.translation is not None and text.translation.strays:
+            stray = text.translation.strays[0]
+            log.warning("words are left out: %s", stray, extra={"kind": path.name})
 
 
 def digest(text: str) -> str:

@@ -31,7 +31,7 @@ from app.api import (
 )
 from app.classroom import Hub, clock
 from app.classroom.courses import Courses
-from app.exercises import ExerciseFileError, Exercises
+from app.exercises import ExerciseFileError, Exercises, Lessons
 from app.live import Lines
 from app.service import status
 from app.service.compute.pool import Pool
@@ -175,8 +175,9 @@ def _check_extras(settings: Settings) -> None:
 
 
 def _courses(settings: Settings, store: Store) -> Courses:
-    """The courses and exercises, read; raises `ExerciseFileError`."""
-    return Courses(Exercises(settings.exercises, store.get), settings.courses, store.get)
+    """The courses, exercises and lessons, read; raises `ExerciseFileError` and `InputError`."""
+    lessons = Lessons(settings.lessons, settings.language)
+    return Courses(Exercises(settings.exercises, store.get), settings.courses, store.get, lessons)
 
 
 def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]]) -> FastAPI:

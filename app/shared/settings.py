@@ -59,6 +59,14 @@ class Settings(BaseSettings):
     robots: Path | None = Field(None, description="Folder with further robot files (*.toml).")
     exercises: Path | None = Field(None, description="Folder with further exercises (*.toml).")
     courses: Path | None = Field(None, description="Folder with further courses (*.toml).")
+    lessons: Path | None = Field(
+        None,
+        description="Folder with files that replace a lesson's words and questions (velocity.toml) or translate "
+        "its words (velocity.de.toml).",
+    )
+    language: str = Field(
+        "en", description="Language of the lessons' words in pages that choose none: en, or one of that folder."
+    )
     data: Path | None = Field(
         None,
         description="Folder for the database of classrooms, created when needed. "

@@ -268,6 +268,11 @@ class Feature:
         """What can be done about where the arm is, as HTML for the status card; "" if there is nothing."""
         return ""
 
+    @property
+    def labels(self) -> Mapping[str, str]:
+        """Words in place of the labels and hints of its declared controls."""
+        return {}
+
     def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
         """What the command palette offers of it: words, and key and value of the message of the button."""
         return ()

@@ -13,7 +13,7 @@ import viser
 
 from app.classroom import ClassroomUnavailable, Hub, Ticket
 from app.classroom.courses import Courses
-from app.exercises import Exercises
+from app.exercises import Exercises, Lessons
 from app.live import Lines
 from app.shared.clouds import Clouds
 from app.shared.connection import (
@@ -80,7 +80,12 @@ class ViewerServer:
         courses: Courses | None = None,
         lines: Lines | None = None,
     ) -> None:
-        known = courses or Courses(Exercises(settings.exercises, store.get), settings.courses, store.get)
+        known = courses or Courses(
+            Exercises(settings.exercises, store.get),
+            settings.courses,
+            store.get,
+            Lessons(settings.lessons, settings.language),
+        )
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
         hub = classroom or Hub.of(settings)
         caches = clouds, maps or Maps(), summaries or Summaries()

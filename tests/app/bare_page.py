@@ -72,7 +72,9 @@ class BarePage:
         self.events: list[tuple[Hashable, object]] = []
         self.feature: Feature | None = None
         self.targets: list[Array] = []
-        self.activity = SimpleNamespace(changed=lambda: None, lesson=None, withheld=frozenset())
+        self.activity = SimpleNamespace(
+            changed=lambda: None, lesson=None, withheld=frozenset(), text=lambda lesson: None
+        )
         self.use(robot)
 
     def use(self, robot: kin.Robot, q: Array | None = None, **more: Any) -> None:

@@ -18,7 +18,16 @@ from typing import Any
 
 from app.classroom.courses.course import LONGEST, MOST_OWN, MOST_PAIRS, Course, Item, Own
 from app.classroom.courses.sealing import TAG, Seal
-from app.exercises import Exercise, ExerciseFileError, Exercises, Shelf, VariantError, form, parse_exercise
+from app.exercises import (
+    Exercise,
+    ExerciseFileError,
+    Exercises,
+    Lessons,
+    Shelf,
+    VariantError,
+    form,
+    parse_exercise,
+)
 from app.exercises.fields import Fields, text_of, toml_of
 from app.exercises.lessons import LESSONS
 from kin import InputError, KinematicsError, Robot, get_robot
@@ -126,10 +135,19 @@ class Courses:
     """The built-in courses, and those of the operator's folder. Read-only, so any thread may use it.
 
     The files are read when they are first asked for.
+
+    Attributes:
+        exercises, lessons: what they name.
     """
 
-    def __init__(self, exercises: Exercises, folder: Path | None = None, find: Find = get_robot) -> None:
-        self.exercises = exercises
+    def __init__(
+        self,
+        exercises: Exercises,
+        folder: Path | None = None,
+        find: Find = get_robot,
+        lessons: Lessons | None = None,
+    ) -> None:
+        self.exercises, self.lessons = exercises, lessons or Lessons()
         self.find = find
         self._folders = [BUILTIN] if folder is None else [BUILTIN, folder]
 

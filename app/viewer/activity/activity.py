@@ -14,6 +14,7 @@ from app.classroom.courses import Course, Courses
 from app.classroom.views import Recalled
 from app.classroom.work import Work
 from app.exercises import Exercise, Shelf, Verdict
+from app.exercises.lesson_text import LessonText
 from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.practice import Practice
 from app.viewer.activity.progress import Progress
@@ -108,6 +109,7 @@ class Activity:
         task: the exercise that the teacher of the room sent.
         note: a sentence below the verdict: whether the answer is stored.
         asked: what the open question of a lesson withholds.
+        language: of the words of lessons, as the visitor has chosen it; "": as the service is set.
         news: grows when other pages of the seat have answered.
     """
 
@@ -127,8 +129,17 @@ class Activity:
         self.task: Exercise | None = None
         self.note = ""
         self.asked: frozenset[str] = frozenset()
+        self.language = ""
         self.news = 0
         self._seat: Seat | None = None
+
+    def text(self, lesson: str) -> LessonText | None:
+        """The words and questions of a lesson in the language of the page; None of one without a file."""
+        return self.courses.lessons.text(lesson, self.language)
+
+    def own_text(self, lesson: str) -> LessonText | None:
+        """The same, if a file of the operator's has it."""
+        return self.courses.lessons.own(lesson, self.language)
 
     # What is open
 

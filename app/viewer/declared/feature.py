@@ -203,7 +203,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.invalidate()
         self.read = self._drawn = self.facts
         stage = self.stage
-        self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write)
+        self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write, self.labels)
         self._write = False
         self._scene.show(self.scene())
         if (words := self.legend()) is not None:

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, TypeVar
 
 import numpy as np
 import viser
 
-from app.viewer.declared.fields import Settings, Spec
+from app.viewer.declared.fields import Choice, Settings, Spec
 from app.viewer.declared.press import Press
 from app.viewer.panel import update_html
 from app.viewer.panel.fence import Crossings, Fence
@@ -29,6 +29,8 @@ from kin.units import Units
 Event = tuple[Hashable, ...]
 Post = Callable[[Hashable, object], None]
 S = TypeVar("S", bound=Settings)
+V = TypeVar("V")
+NO_LABELS: Mapping[str, str] = {}
 
 
 @dataclass(slots=True, eq=False)
@@ -158,6 +160,7 @@ class PanelView:
         self._live: dict[int, _Mounted] = {}
         self._serials = count(1)
         self._presses = 0
+        self._labels: Mapping[str, str] = {}
 
     @property
     def top(self) -> viser.GuiFolderHandle:
@@ -165,10 +168,25 @@ class PanelView:
         return self._top
 
     def show(
-        self, nodes: Sequence[Node], settings: Settings, robot: Robot, units: Units, write: bool = False
+        self,
+        nodes: Sequence[Node],
+        settings: Settings,
+        robot: Robot,
+        units: Units,
+        write: bool = False,
+        labels: Mapping[str, str] = NO_LABELS,
     ) -> None:
-        """Make the panel equal to these nodes. `write`: controls whose value was refused show the setting."""
+        """Make the panel equal to these nodes.
+
+        Args:
+            write: controls whose value was refused show the setting.
+            labels: words in place of labels and hints; with others, all controls are made anew.
+        """
         self._settings, self._robot, self._units, self._write = settings, robot, units, write
+        if labels != self._labels:
+            while self._mounted:
+                self._drop(self._mounted.popitem()[1])
+            self._labels = labels
         self._fill(self._top, nodes, self._mounted)
 
     def received(self, settings: S, path: str, serial: int, posted: object) -> S | None:
@@ -208,7 +226,8 @@ class PanelView:
     ) -> None:
         numbers: dict[type, int] = {}
         gone = set(mounted)
-        for order, node in enumerate(nodes, 1):
+        for order, declared in enumerate(nodes, 1):
+            node = self._in_words(declared) if self._labels else declared
             kind = type(node)
             number = numbers[kind] = numbers.get(kind, 0) + 1
             if isinstance(node, Buttons) and node.offered == ():
@@ -239,6 +258,39 @@ class PanelView:
         self._live.pop(one.serial, None)
         for child in one.children.values():
             self._forget(child)
+
+    def _in_words(self, node: Node) -> Node:
+        """A node with its own words in place of its labels."""
+
+        def said(label: str) -> str:
+            return self._labels.get(label, label)
+
+        def hinted(hint: str | None) -> str | None:
+            return hint and said(hint)
+
+        match node:
+            case Folder():
+                return replace(node, label=hinted(node.label))
+            case Button():
+                return replace(node, label=said(node.label), hint=hinted(node.hint))
+            case Buttons():
+                events = self._all_said(node.events)
+                words = dict(zip(node.events, events, strict=True))
+                offered = node.offered and tuple(words[label] for label in node.offered if label in words)
+                label, hint = said(node.label), hinted(node.hint)
+                return replace(node, label=label, hint=hint, events=events, offered=offered)
+            case Control():
+                spec = self._spec(node)
+                label, hint = said(node.label or spec.label), hinted(node.hint or spec.hint)
+                if isinstance(spec, Choice):
+                    spec = spec.narrowed(self._all_said(spec.offered(self._robot)))
+                return replace(node, label=label, hint=hint, spec=spec)
+        return node
+
+    def _all_said(self, values: Mapping[str, V]) -> dict[str, V]:
+        """Values by other words for their labels; where two of these would be the same, by the labels."""
+        said = {self._labels.get(label, label): value for label, value in values.items()}
+        return said if len(said) == len(values) else dict(values)
 
     def _spec(self, node: Control) -> Spec:
         return node.spec or self._settings.spec(node.path)

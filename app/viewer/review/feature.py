@@ -105,9 +105,10 @@ class Reviewing(Practising):
         """Open the lesson of a question, on another of its arms; its other answers there stay."""
         stage = self.stage
         lesson = next((one for one in LESSONS if one.key == missed.lesson), None)
-        if lesson is None:
+        text = stage.activity.text(missed.lesson)
+        if lesson is None or text is None:
             raise InputError("review", missed.key, "a question of a lesson")
-        robot = other_arm(lesson, missed.question, missed.robot, random.Random())
+        robot = other_arm(lesson, text, missed.question, missed.robot, random.Random())
         self._review.move(missed.key, robot.id)
         self.change(asked_in=lesson.key, arrived=False)
         stage.activity.question_again = missed.key

@@ -38,6 +38,7 @@ AXES_HINT = (
     "those of the base. The key G switches. Hold Shift while dragging to move in steps."
 )
 NOTATION_HINT = "How rotations are written in the read-out, and typed in a target"
+LANGUAGE_HINT = "The words of the lessons, as far as this service has them in another language"
 NOTATION_UNDO = "How rotations are written"
 
 
@@ -52,6 +53,7 @@ class ViewState(Settings):
         detailed: whether the body is that of an installed package, if there is one for the arm.
         avoid: whether the arm is moved to targets without touching itself or an obstacle.
         angles, quaternions: how rotations are written and typed: keys of `ANGLES` and `QUATERNIONS`.
+        language: of lessons; "", or one that the service does not have: as it is set.
     """
 
     frames: bool = flag("Link frames", hint="The frame of every DH row: x red, y green, z blue")
@@ -85,6 +87,15 @@ class ViewState(Settings):
         "wxyz",
         hint=NOTATION_HINT,
         undo=NOTATION_UNDO,
+    )
+
+    language: str = choice(
+        "Language",
+        {"As the service is set": ""},
+        "",
+        hint=LANGUAGE_HINT,
+        undo="Language",
+        anything=True,
     )
 
     @property

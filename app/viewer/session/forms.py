@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import viser
 
+from app.viewer.activity.activity import Activity
 from app.viewer.arm import Arm
 from app.viewer.declared.panel import Buttons, Control, Html, Node, PanelView
 from app.viewer.labels import TEXT_SIZES
@@ -27,6 +28,7 @@ class FormsPage(Protocol):
     units: Units
     view: ViewState
     fence: Fence
+    activity: Activity
 
     @property
     def now(self) -> Arm:
@@ -62,7 +64,8 @@ class Forms:
         """Show what the page has chosen."""
         choices, now, units = self._choices, self._page.now, self._page.units
         for place, view in self._views.items():
-            view.show(self._nodes[place], choices, now.robot, units)
+            nodes = [*self._nodes[place], *(self._language() if place == "view" else ())]
+            view.show(nodes, choices, now.robot, units)
 
     def read(self, place: str, path: str, serial: int, posted: object) -> PageChoices:
         """The choices with what a control has sent; for what it does not offer, it shows the present one again.
@@ -77,6 +80,16 @@ class Forms:
             raise
         assert found is not None  # these controls are never replaced
         return found
+
+    def _language(self) -> Sequence[Node]:
+        """The choice of a language, if there are several."""
+        lessons = self._page.activity.courses.lessons
+        if len(lessons.languages) < 2:
+            return ()
+        spec: Any = PageChoices.spec("view.language")
+        offered = {name: code for code, name in lessons.languages.items()}
+        chosen = lessons.spoken(self._page.view.language)
+        return [Control("view.language", spec=spec.narrowed(offered), value=chosen)]
 
     @property
     def _choices(self) -> PageChoices:

@@ -17,7 +17,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.content import arm_for
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.panel import Post, assign, listen
+from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.part import Block, add_html
 from app.viewer.review.feature import Reviewing
 from app.viewer.views.templates import render
@@ -52,10 +52,10 @@ class LessonChoice:
         post: Post,
     ) -> None:
         self._gui = gui
+        self._forward = post
         self._page = page
         self._parent = parent
         self._stage = stage
-        self._titles = (NONE, *(each.title for each in choices()))
         with parent:
             bar = add_html(gui)
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
@@ -63,9 +63,9 @@ class LessonChoice:
             self.courses = CourseFeature(stage, bar)
             self.author = Author(stage)
             self.reviewing = Reviewing(stage)
-            self._overview: Block | None = add_html(gui, _overview())
+            self._overview: Block | None = add_html(gui, self._list())
             self.sheets: Worksheets | None = Worksheets(stage, None, page)
-        listen(self._choice, post, "lesson")
+        listen(self._choice, self._post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
         self.shown: Lesson | None = None
         self.guide: Guide | None = None
@@ -80,14 +80,15 @@ class LessonChoice:
         Raises:
             kin.InputError: for an unknown title.
         """
-        if title not in self._titles:
+        chosen = next((each for each in choices() if each.title == title), None)
+        if chosen is None and title != NONE:
             assign(self._choice, self._title)
-            raise InputError("lesson", title, "one of " + ", ".join(self._titles))
-        assign(self._choice, title)
+            raise InputError("lesson", title, "one of " + ", ".join((NONE, *(each.title for each in choices()))))
+        assign(self._choice, self._said(chosen))
         self.remove()
         try:
             with self._parent:
-                self._show(next((each for each in choices() if each.title == title), None), steps)
+                self._show(chosen, steps)
         finally:
             self._stage.activity.changed()
 
@@ -101,14 +102,15 @@ class LessonChoice:
         activity, always = self._stage.activity, (self.exercises, self.courses, self.author, self.reviewing)
         if chosen is not None and issubclass(chosen, Lesson) and chosen.by_rows and self._stage.now.robot.coupled:
             assign(self._choice, NONE)
-            self._overview = add_html(self._gui, _not_for(chosen, self._stage.now.robot))
+            self._overview = add_html(self._gui, _not_for(chosen, self._stage.now.robot) + self._list())
             chosen = None
         elif chosen is None:
-            self._overview = add_html(self._gui, _overview())
+            self._overview = add_html(self._gui, self._list())
         elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
             with self._box:
-                left = self._left.get((chosen.key, arm_for(chosen.key, self._stage.now.robot).id))
+                about = arm_for(activity.text(chosen.key), self._stage.now.robot)
+                left = self._left.get((chosen.key, about.id))
                 self.guide = Guide(self._stage, chosen, left if steps is None else steps, after(chosen))
                 self.shown = chosen(self._stage)
                 self.guide.attach(self.shown)
@@ -140,7 +142,34 @@ class LessonChoice:
 
     @property
     def _title(self) -> str:
-        return next((each.title for each in choices() if each.key == self._stage.activity.lesson), NONE)
+        return self._said(next((each for each in choices() if each.key == self._stage.activity.lesson), None))
+
+    @property
+    def _titles(self) -> tuple[str, ...]:
+        return (NONE, *map(self._said, choices()))
+
+    def _said(self, chosen: type[Feature] | None) -> str:
+        """The title of a choice in the language of the page."""
+        if chosen is None:
+            return NONE
+        text = self._stage.activity.own_text(chosen.key)
+        return chosen.title if text is None else text.title or chosen.title
+
+    def _post(self, key: Hashable, value: object) -> None:
+        """Choices are known by their own titles, in whatever language one was made."""
+        self._forward(key, next((each.title for each in choices() if self._said(each) == value), value))
+
+    def _list(self) -> str:
+        """All lessons, with one sentence each."""
+        lessons = [(each, self._stage.activity.own_text(each.key)) for each in LESSONS]
+        return render("panel/lessons", lessons=lessons, more=MORE)
+
+    def show_language(self) -> None:
+        """The page has another language."""
+        self._choice.options = self._titles
+        assign(self._choice, self._title)
+        if self._overview is not None:
+            update_html(self._overview, self._list())
 
     def open(self, key: str | None, steps: dict[str, object] | None = None) -> None:
         """Open the lesson with this key, if there is one, at its `steps`; None: close the open one."""
@@ -198,9 +227,4 @@ def lesson_with_key(key: str | None) -> type[Lesson] | None:
 
 def _not_for(lesson: type[Lesson], robot: Robot) -> str:
     """Why a lesson is not shown for an arm, above all lessons."""
-    return render("panel/not_for", title=lesson.title, robot=robot.name) + _overview()
-
-
-def _overview() -> str:
-    """All lessons, with one sentence each."""
-    return render("panel/lessons", lessons=LESSONS, more=MORE)
+    return render("panel/not_for", title=lesson.title, robot=robot.name)

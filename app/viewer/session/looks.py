@@ -76,6 +76,10 @@ class Looks:
         if view.detailed != page.bodies.detailed:
             page.bodies.detailed, page.bodies.last_refusal = view.detailed, ""
             self.redraw_body()
+        if view.language != before.language:
+            page.activity.language = view.language
+            page.lessons.show_language()
+            page.for_features(lambda feature: feature.on_style())
         if view.rotations != before.rotations:
             page.panel.readout.use_rotations(view.rotations)
             page.numbers.use_pose()

@@ -449,6 +449,7 @@ class VisitorPage(ShownArm, Worker):
         gui = self.client.gui
         saved = self._persistence.stored
         self.units, self.view, self.system_dark = saved.units, saved.view, self._persistence.system_dark
+        self.activity.language = self.view.language
         size_labels(self.client.scene, text_factor(self._persistence.text_size))
         self.frames = saved.frames
         robot = robot_of(self, saved.robot)

@@ -86,10 +86,11 @@ class Worksheets(DeclaredFeature[Settings, Facts[Settings]]):
         stage, lesson = self.stage, self._lesson
         if lesson is None:
             return Sheet("The arm at a configuration", stage.now.robot, stage.now.goal, stage.units)
-        robot = arm_for(lesson.key, stage.now.robot)
-        here, found = robot == stage.now.robot, lesson.asked(robot, stage.units)
+        text = stage.activity.text(lesson.key)
+        robot = arm_for(text, stage.now.robot)
+        here, found = robot == stage.now.robot, lesson.outline_in(robot, stage.units, text)
         return Sheet(
-            type(lesson).title,
+            lesson.title if found.text is None else found.text.title or lesson.title,
             robot,
             stage.now.goal if here else robot.q_home,
             stage.units,

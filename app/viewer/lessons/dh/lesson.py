@@ -24,7 +24,7 @@ from app.viewer.lessons.dh.axes_drawing import axis_names, joint_axes, room
 from app.viewer.lessons.dh.both import BothInView
 from app.viewer.lessons.dh.facts import DHFacts
 from app.viewer.lessons.dh.player import walked
-from app.viewer.lessons.dh.questions import outline
+from app.viewer.lessons.dh.questions import facts
 from app.viewer.lessons.dh.settings import DHSettings
 from app.viewer.lessons.dh.steps import length
 from app.viewer.lessons.figure_nodes import FigureNodes
@@ -46,7 +46,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
     computes = False
     about = "How four motions per row lead from the base to the tool, one after another."
     messages = frozenset({"choose", "check", "show", "back", "restart"})
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = DHSettings, DHFacts
     left: ClassVar[Left] = "table"
     pace = 0.1

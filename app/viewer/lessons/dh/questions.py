@@ -12,9 +12,9 @@ from app.exercises.variant import Quantity
 from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.dh.axes_drawing import axis_names
 from app.viewer.lessons.dh.steps import amount, axis_name, expression, low, symbol, value
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.content import LessonFacts
 from app.viewer.lessons.guide.leads import DOWN, UP, direction, line
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Lead, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance, moved
 from kin import Robot, compare, fk
 from kin.axes import pairs
@@ -30,11 +30,6 @@ ROW = {  # an example whose motions do not commute
 }
 _SKEW = 0.01  # sine of a twist that turns the next axis
 OFF = 0.15  # of the reach: between two lines that do not meet
-
-
-def outline(robot: Robot, units: Units) -> Outline:
-    """The outline for this arm."""
-    return outline_of("dh", robot, units, facts(robot, units))
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:

@@ -20,7 +20,7 @@ from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Work
 from app.viewer.lessons.equations import views
 from app.viewer.lessons.equations.facts import EquationsFacts
-from app.viewer.lessons.equations.questions import outline
+from app.viewer.lessons.equations.questions import facts
 from app.viewer.lessons.equations.settings import EquationsSettings
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel.status import Notice
@@ -38,7 +38,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
     title = "Equations"
     computes = False
     about = "The arm’s equations. For the book’s arms, also its misprints."
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = EquationsSettings, EquationsFacts
     left: ClassVar[Left] = "pose"
 

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from app.exercises.variant import Quantity
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.content import LessonFacts
 from app.viewer.lessons.guide.leads import DOWN, UP, bar, direction
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Lead, Pose
 from app.viewer.lessons.guide.poses import as_configuration, first_clear
 from kin import Robot, fk, jacobian
 from kin.transforms import Array
@@ -18,11 +18,6 @@ from kin.units import Units, fixed
 
 NEAR = 0.01  # m by which a printed coordinate may differ from the right one
 _TRIED, _ROUNDS = 40, 20
-
-
-def outline(robot: Robot, units: Units) -> Outline:
-    """The outline for this arm."""
-    return outline_of("equations", robot, units, facts(robot, units))
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import TypeVar
 
 import numpy as np
@@ -19,11 +18,9 @@ from app.exercises.lesson_text import (
     LessonText,
     QuestionText,
     StepText,
-    lesson_files,
-    load_lesson,
+    texts_of,
 )
 from app.exercises.variant import Quantity, Variant
-from app.exercises.worked import WorkedText
 from app.viewer.lessons.guide.outline import (
     Answered,
     Bar,
@@ -99,36 +96,39 @@ class AskedFacts:
         return LessonFacts(numbers, functions, words, self.poses, leads=self.leads)
 
 
-@cache
-def texts_of(lesson: str) -> LessonText:
-    """The texts of a lesson."""
-    return load_lesson(lesson_files()[lesson])
-
-
-def arms_of(lesson: str) -> tuple[str, ...]:
-    """The ids of the arms that a lesson asks about, but for single steps; none of one that has no file."""
-    return texts_of(lesson).arms if lesson in lesson_files() else ()
-
-
-def arm_for(lesson: str, robot: Robot) -> Robot:
+def arm_for(text: LessonText | None, robot: Robot) -> Robot:
     """The arm that a lesson asks about while this one is on show: itself if the file names it, else the first."""
-    arms = arms_of(lesson) or (robot.id,)
+    arms = (robot.id,) if text is None else text.arms
     return robot if robot.id in arms else get_robot(arms[0])
 
 
-def written_example(lesson: str) -> WorkedText | None:
-    """The worked example of a lesson; None of one that has no file."""
-    return texts_of(lesson).example if lesson in lesson_files() else None
-
-
-def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts | AskedFacts) -> Outline:
-    """The outline of a lesson with a file; raises `ExerciseFileError` for what the facts do not have.
+def outline_of(
+    lesson: str, robot: Robot, units: Units, facts: LessonFacts | AskedFacts, text: LessonText | None = None
+) -> Outline:
+    """The outline of a lesson.
 
     Steps and check that the file asks about other arms are left empty.
+
+    Args:
+        text: None: that of the lesson's own file.
+
+    Raises:
+        ExerciseFileError: the text names what the facts do not have, or something in it has no value for this arm.
     """
-    text = texts_of(lesson)
+    text = text or texts_of(lesson)
     if isinstance(facts, AskedFacts):
         facts = facts.listed(text.facts)
+    try:
+        return _outline(lesson, robot, units, facts, text)
+    except ExerciseFileError:
+        raise
+    except ValueError as error:  # such as an expression, or a choice without a right option
+        field = getattr(error, "field", "") or "steps"
+        valid = f"what has a value for the arm “{robot.name}”"
+        raise ExerciseFileError(text.file, field, str(error), valid) from None
+
+
+def _outline(lesson: str, robot: Robot, units: Units, facts: LessonFacts, text: LessonText) -> Outline:
     names = {*facts.numbers, *facts.functions, *facts.words}
     if missing := sorted(text.facts.keys() - names):
         raise ExerciseFileError(text.file, "facts", missing[0], f"one of {', '.join(sorted(names))}")
@@ -149,6 +149,7 @@ def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts | Ask
         tuple(made.question(one) for one in check),
         tuple(one.withheld for one in check),
         facts.poses.get("home"),
+        text,
     )
 
 
@@ -186,7 +187,7 @@ class _Maker:
             if self.variant.number(each.offered)
         ]
         known = {**self.facts.leads, NO_PREVIEW: None}
-        return Leads(tuple(self.named("leads", name, known) for name in names))
+        return Leads(tuple(self.named(f"{text.at}leads", name, known) for name in names))
 
     def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | SemiAxis | Cosine | Leads | None:
         """How answers to a step are drawn."""
@@ -197,17 +198,17 @@ class _Maker:
                 start = self._point(text, text.drawn.start)
                 return Bar(start, self._point(text, text.drawn.end), self.variant.number(text.drawn.scale))
             case (name, joint):
-                return self._joint(name, joint)
+                return self._joint(text.at, name, joint)
             case str(name):
-                return self.named("drawn.shape", name, self.facts.shapes)
+                return self.named(f"{text.at}drawn.shape", name, self.facts.shapes)
         return None
 
     def _point(self, text: StepText, given: str | tuple[Expression, ...]) -> tuple[float, ...]:
         """A point ``(3,)``: of the arm at the pose of the step, or of the lesson."""
-        pose = self.named("pose", text.pose or "home", self.facts.poses)
+        pose = self.named(f"{text.at}pose", text.pose or "home", self.facts.poses)
         assert pose is not None
         if given == "end":
-            pose = self.named("end", text.end, self.facts.poses) or pose
+            pose = self.named(f"{text.at}end", text.end, self.facts.poses) or pose
         if given == "target" and "target" in pose.drawing:
             return tuple(np.reshape(np.array(pose.drawing["target"], float), (4, 4))[:3, 3].tolist())
         if isinstance(given, str):
@@ -215,11 +216,11 @@ class _Maker:
         there = replace(self.variant, q=np.array(pose.q))
         return tuple(there.number(each) for each in given)
 
-    def _joint(self, name: str, joint: int) -> Drawn:
+    def _joint(self, at: str, name: str, joint: int) -> Drawn:
         """How a wrong value of a joint is drawn, which counts from 1."""
-        pose = self.named("drawn.pose", name, self.facts.poses)
+        pose = self.named(f"{at}drawn.pose", name, self.facts.poses)
         if pose is None or joint > len(pose.q):
-            raise ExerciseFileError(self.file, "drawn.joint", joint, "a joint of the arm")
+            raise ExerciseFileError(self.file, f"{at}drawn.joint", joint, "a joint of the arm")
         return Drawn(pose.q, joint - 1)
 
     def elsewhere(self, text: StepText) -> Step:
@@ -236,14 +237,14 @@ class _Maker:
             body,
             None if asked is None else self.question(asked),
             shown,
-            self.named("pose", text.pose, self.facts.poses),
-            self.named("end", text.end, self.facts.poses),
+            self.named(f"{text.at}pose", text.pose, self.facts.poses),
+            self.named(f"{text.at}end", text.end, self.facts.poses),
             practice,
-            self.named("figure", text.figure, self.facts.figures),
+            self.named(f"{text.at}figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
             drawn=self.drawn(text, asked),
             estimate=None if before is None else self.question(before),
             guessed=self.leads(before),
-            answered=self.named("answered", text.answered, self.facts.answered),
+            answered=self.named(f"{text.at}answered", text.answered, self.facts.answered),
             arms=text.arms,
         )

@@ -76,8 +76,11 @@ class ExampleView:
         if self._left is not None and not (self._left == self._stage.now.goal).all():
             self.close()
 
-    def on_style(self) -> None:
-        """The units have changed."""
+    def on_style(self, text: WorkedText | None) -> None:
+        """The units have changed, or the words."""
+        if text is not self._text:
+            self._text, self._said = text, ()
+            self._show_words()
         if self._player is not None:
             self._player.use(self._example())
             self._show()

@@ -19,7 +19,7 @@ from app.viewer.exercises.views import Following
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
 from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
-from app.viewer.lessons.guide.content import arm_for, arms_of, written_example
+from app.viewer.lessons.guide.content import arm_for
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Outline, Pose
@@ -78,7 +78,7 @@ class Guide(Feature):
     ) -> None:
         super().__init__(stage)
         self._lesson, self._following = lesson, following
-        self.about = arm_for(lesson.key, stage.now.robot)
+        self.about = arm_for(stage.activity.text(lesson.key), stage.now.robot)
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
         self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
@@ -89,7 +89,8 @@ class Guide(Feature):
         self._target: Array | None = None  # of the step on show, of which the picture has to contain it
         gui = stage.client.gui
         self._goal = add_html(gui)
-        self._example = ExampleView(stage, written_example(lesson.key))
+        text = self._progress.outline.text
+        self._example = ExampleView(stage, None if text is None else text.example)
         with gui.add_folder("Steps"):
             self._steps = add_html(gui)
         self._joints_box = gui.add_checkbox("Joint sliders", False, hint=JOINTS_HINT)
@@ -180,6 +181,12 @@ class Guide(Feature):
         return (steps[at].about if at < len(steps) else None) or self.about
 
     @property
+    def _arm_ids(self) -> tuple[str, ...]:
+        """The ids of the arms that it asks about, but for single steps."""
+        text = self._progress.outline.text
+        return () if text is None else text.arms
+
+    @property
     def is_asked(self) -> bool:
         """Whether that arm is on show: with another one the step can be read, and the lesson be explored."""
         return self.stage.now.robot == self.asked_about
@@ -199,7 +206,7 @@ class Guide(Feature):
         self._example.close()
         # Other numbers are asked on another arm, and answers stay with theirs.
         robot = self.stage.now.robot
-        if not self.is_asked and robot.id in arms_of(self._lesson.key):
+        if not self.is_asked and robot.id in self._arm_ids:
             self._ask_about(robot)
         self._sheets.clear()
         self._copies.remove()
@@ -222,8 +229,9 @@ class Guide(Feature):
         self.due = self._example.advance(now)
 
     def on_style(self) -> None:
-        self._example.on_style()
         self._progress.use(self._outline())
+        text = self._progress.outline.text
+        self._example.on_style(None if text is None else text.example)
         self._ask_earlier()
         self._sheets.clear()
         self._show()
@@ -242,7 +250,7 @@ class Guide(Feature):
 
     def restore(self, state: dict[str, object]) -> None:
         self._example.close()
-        arms, arm = arms_of(self._lesson.key), state.get("arm")
+        arms, arm = self._arm_ids, state.get("arm")
         if isinstance(arm, str) and arm in arms and arm != self.about.id:
             self._ask_about(self.stage.store.get(arm))
         exercises = self.stage.activity.courses.exercises
@@ -271,7 +279,8 @@ class Guide(Feature):
         self._progress.ask_also(earlier.questions(drawn, exercises, self.stage.units))
 
     def _outline(self) -> Outline:
-        return self._lesson.asked(self.about, self.stage.units)
+        text = self.stage.activity.text(self._lesson.key)
+        return self._lesson.outline_in(self.about, self.stage.units, text)
 
     # Answers
 
@@ -419,9 +428,9 @@ class Guide(Feature):
             activity.changed()
         right, count = progress.score
         if right == count > 0:
-            activity.pass_lesson(self._lesson.key, self.about.id, arms_of(self._lesson.key))
+            activity.pass_lesson(self._lesson.key, self.about.id, self._arm_ids)
         open_ = [key for key in progress.questions if self._is_on_show(key)]
-        update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
+        update_html(self._goal, views.goal_html(self._lesson.title, progress.outline))
         offered = "" if here else self.asked_about.name
         sheets = {key: self._sheet(key) for key in open_}
         of = f"{self._lesson.key} {self.about.id}"

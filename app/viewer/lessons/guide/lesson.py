@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import logging
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
+from app.exercises import ExerciseFileError
+from app.exercises.lesson_text import LessonText
 from app.exports.worksheet import Formula, Left
 from app.viewer.feature import Feature
+from app.viewer.lessons.guide.content import AskedFacts, LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Outline, Question, Step
 from app.viewer.lessons.guide.progress import Progress
 from kin import Robot, get_robot
-from kin.units import Units
+from kin.units import DEFAULT_UNITS, Units
+
+log = logging.getLogger("kinboard.lessons")
 
 
-class Lesson(Feature, ABC):
+class Lesson(Feature):
     """A feature of the tab *Learn*. The page shows its outline above its controls.
 
     After a change that concerns `on_steps`, call ``stage.activity.changed()``: the outline is shown again.
@@ -46,18 +52,61 @@ class Lesson(Feature, ABC):
         return self.stage.now.goal.tolist()
 
     @staticmethod
-    @abstractmethod
-    def outline(robot: Robot, units: Units) -> Outline:
+    def asked_of(robot: Robot, units: Units) -> LessonFacts | AskedFacts:
+        """What the words and questions of its file may use of an arm, in the reader's units."""
+        raise NotImplementedError
+
+    @classmethod
+    def outline(cls, robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
         """Goal, steps and check for this arm, which the file names for them.
+
+        Args:
+            text: None: that of its own file.
 
         It is made again for each arm and unit while the visitor waits. So what needs inverse kinematics is kept
         for the arm: without a closed form, a target that is missed takes some tenths of a second.
         """
+        return outline_of(cls.key, robot, units, cls.asked_of(robot, units), text)
 
     @classmethod
-    def asked(cls, robot: Robot, units: Units) -> Outline:
+    def outline_in(cls, robot: Robot, units: Units, text: LessonText | None) -> Outline:
+        """The outline in the words of a text; where that is not made for this arm, in those of its own file."""
+        try:
+            return cls.asked(robot, units, text)
+        except ValueError as error:
+            if text is None:
+                raise
+            log.warning("the words of a lesson are left out: %s", error, extra={"kind": text.file})
+            return replace(cls.asked(robot, units), unfit=True)
+
+    @classmethod
+    def verify(cls, text: LessonText) -> None:
+        """Make and judge everything that a text asks, about each of its arms.
+
+        Raises:
+            ExerciseFileError: naming the file, the field and the arm.
+        """
+        for robot in map(get_robot, text.every_arm):
+            try:
+                for key, question in cls.outline(robot, DEFAULT_UNITS, text).questions():
+                    if not question.judge(question.right()).right:
+                        raise ValueError(f"the right answer to question {key} is not accepted")
+            except ExerciseFileError:
+                raise
+            except ValueError as error:
+                valid = f"questions that can be asked about the arm “{robot.name}”"
+                raise ExerciseFileError(text.file, "steps", str(error), valid) from None
+
+    @property
+    def labels(self) -> Mapping[str, str]:
+        text = self.stage.activity.text(self.key)
+        return {} if text is None else text.controls
+
+    @classmethod
+    def asked(cls, robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
         """The outline for an arm that the file names, with the steps that are asked about others."""
-        return cls.completed(cls.outline(robot, units), robot, units)
+        found = cls.outline(robot, units) if text is None else cls.outline(robot, units, text)
+        return cls.completed(found, robot, units)
 
     @classmethod
     def completed(cls, found: Outline, robot: Robot, units: Units) -> Outline:
@@ -66,7 +115,7 @@ class Lesson(Feature, ABC):
         for step in found.steps:
             if step.arms and robot.id not in step.arms:
                 arm = step.arms[0]
-                other = others[arm] = others.get(arm) or cls.outline(get_robot(arm), units)
+                other = others[arm] = others.get(arm) or cls.outline(get_robot(arm), units, found.text)
                 there = next(each for each in other.steps if each.title == step.title)
                 steps.append(replace(there, about=get_robot(arm), pose=there.pose or other.pose))
             else:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from markupsafe import Markup
 
+from app.exercises.lesson_text import LessonText
 from app.exercises.questions import (
     LEAST,
     Choice,
@@ -238,6 +239,8 @@ class Outline:
     Attributes:
         withheld: for each question of the check, as in `Step`; what is left out withholds nothing.
         pose: what the scene shows during the check, and where a step has no pose of its own.
+        text: whose words these are; None: the lesson has no file.
+        unfit: whether the words of another file are wanted, which cannot be asked about this arm.
     """
 
     goal: str
@@ -245,6 +248,8 @@ class Outline:
     check: tuple[Question, ...]
     withheld: tuple[frozenset[str], ...] = ()
     pose: Pose | None = None
+    text: LessonText | None = None
+    unfit: bool = False
 
     def pose_of(self, at: int) -> Pose | None:
         """What the scene shows for the step of this index, or during the check if there is none."""

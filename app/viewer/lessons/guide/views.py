@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from app.exercises.lesson_text import LessonText
+from app.exercises.lessons import ENGLISH
 from app.exercises.questions import Choice
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.exercises.views import Following, entry_of
-from app.viewer.lessons.guide.outline import Question
+from app.viewer.lessons.guide.outline import Outline, Question
 from app.viewer.lessons.guide.progress import Mark, Progress
 from app.viewer.views.templates import render
 
@@ -18,9 +20,34 @@ MARKS: dict[Mark, tuple[str, str, str]] = {
 }
 
 
-def goal_html(lesson: str, goal: str) -> str:
-    """What the student can do at the end of the lesson of that title."""
-    return render("guide/goal", lesson=lesson, goal=goal)
+UNFIT = "The file of this lesson asks what has no answer for this arm: the original is shown."
+PARTS = {("lesson",): "the goal", ("check",): "the check", ("example",): "the worked example"}
+
+
+def goal_html(lesson: str, outline: Outline) -> str:
+    """What the student can do at the end of the lesson of that title; what is not in the words that are wanted."""
+    text = outline.text
+    title, note = (lesson, "") if text is None else (text.title or lesson, _untranslated(text))
+    note = UNFIT if outline.unfit else note
+    return render("guide/goal", lesson=title, goal=outline.goal, note=note, language=language_of(text))
+
+
+def language_of(text: LessonText | None) -> str:
+    """The code of the language of a lesson's words."""
+    return ENGLISH if text is None or text.translation is None else text.translation.language
+
+
+def _untranslated(text: LessonText) -> str:
+    """What a lesson says in the words of the original, as a sentence; "": nothing."""
+    if text.translation is None or language_of(text) == ENGLISH:
+        return ""
+    said, missing = text.translation.said, text.translation.missing
+    if not any(map(any, (texts.values() for texts in said.values()))):
+        return "This lesson is not translated yet." if said else ""
+    steps = [f"“{said[place].get(place[1]) or place[1]}”" for place in missing if place[0] == "steps"]
+    others = [name for place, name in PARTS.items() if place in missing]
+    found = [*steps, *others, *(() if text.controls else ("the labels below",))]
+    return f"Not translated yet: {', '.join(found)}." if found else ""
 
 
 def steps_html(
@@ -49,6 +76,7 @@ def steps_html(
         )
         return render(
             "guide/check",
+            language=language_of(progress.outline.text),
             of=of,
             arm=arm,
             marks=marks,
@@ -67,6 +95,7 @@ def steps_html(
     estimate = step.estimate if not closed or progress.mark(before) != "open" else None
     return render(
         "guide/step",
+        language=language_of(progress.outline.text),
         of=of,
         marks=marks,
         at=at,

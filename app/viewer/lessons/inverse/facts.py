@@ -7,8 +7,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from app.exercises.lesson_text import texts_of
 from app.viewer.declared.facts import Facts
-from app.viewer.lessons.guide.content import arms_of
 from app.viewer.lessons.guide.outline import Configuration
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.derive import Signs, arm_angle
@@ -44,7 +44,7 @@ class InverseFacts(Facts[InverseSettings]):
     def opened(self) -> tuple[bool, ...]:
         """For each step, whether its numbers are on show."""
         s = self.settings
-        if self.robot.id not in arms_of("inverse"):  # nothing is asked
+        if self.robot.id not in texts_of("inverse").arms:  # nothing is asked
             return (True,) * len(self.keys)
         return tuple(s.all or answered for answered in s.answered or (False,) * len(self.keys))
 

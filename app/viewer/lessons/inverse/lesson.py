@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import kin
+from app.exercises.lesson_text import LessonText, texts_of
 from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Html, Node
@@ -20,7 +21,6 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.feature import Stage
 from app.viewer.lessons.figure_nodes import FigureNodes
-from app.viewer.lessons.guide.content import arms_of
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number, Outline
 from app.viewer.lessons.guide.poses import as_configuration
@@ -79,7 +79,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         if not f.exists:
             arms = [
                 Button(self.stage.store.get(robot).name, self.event(self.on_arm, robot), ARM_HINT, key=robot)
-                for robot in arms_of(self.key)
+                for robot in texts_of(self.key).arms
             ]
             return [Html(views.others_html, (f.robot,), key="others"), *arms]
         opened = dict(zip(f.keys, f.opened, strict=True))
@@ -115,7 +115,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         if self.settings.restart:
             progress.restart()
             self.change(restart=False, taken={})
-        progress.use(self._outline)
+        progress.use(self._outline(progress.outline.text))
         for number, key in enumerate(self.facts.keys, 1):
             self._take_way(progress, str(number), key)
         asked = dict(progress.outline.questions())
@@ -133,11 +133,10 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self.invalidate()
         return self.facts.exercise
 
-    @property
-    def _outline(self) -> Outline:
+    def _outline(self, text: LessonText | None) -> Outline:
         """The outline with the questions about it."""
         units = self.stage.units
-        return self.completed(outline_of(self._exercise, units), self.facts.robot, units)
+        return self.completed(outline_of(self._exercise, units, text), self.facts.robot, units)
 
     def _take_way(self, progress: Progress, number: str, key: StepKey) -> None:
         """Follow the other way where the student has typed it."""
@@ -151,7 +150,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         step = given.followed.derivation.step(key)
         if question.way_of(answer) > 0 and step is not None and step.split >= 0:
             self.change(signs=flipped(given.signs, step.split))
-            progress.use(self._outline)
+            progress.use(self._outline(progress.outline.text))
 
     # Events
 

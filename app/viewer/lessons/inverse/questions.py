@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
+from app.exercises.lesson_text import LessonText
 from app.viewer.lessons.guide.leads import bar, up_or_down
 from app.viewer.lessons.guide.outline import (
     Choice,
@@ -43,23 +45,25 @@ _METHODS: dict[StepKey, str] = {
 
 
 @lru_cache(maxsize=64)
-def outline(robot: Robot, units: Units) -> Outline:
+def outline(robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
     """The outline for this arm, with a target near its home."""
     arm = arm_of(robot)
-    assert arm is not None
-    return outline_of(exercise(arm, example(arm)), units)
+    if arm is None:
+        raise ValueError(f"the lesson has no derivation for {robot.name}")
+    return outline_of(exercise(arm, example(arm)), units, text)
 
 
-def outline_of(given: Exercise, units: Units) -> Outline:
+def outline_of(given: Exercise, units: Units, text: LessonText | None = None) -> Outline:
     """The outline for a target and the branch that is followed."""
-    texts, keys = words.texts(given.arm.robot, units), given.arm.keys
+    texts, keys = words.texts(given.arm.robot, units, text), given.arm.keys
     asked, more = texts.steps[: len(keys)], texts.steps[len(keys) :]  # those after the derivation are as they are
-    steps = (*(_step(given, key, step, units) for key, step in zip(keys, asked, strict=True)), *more)
+    titles = dict(zip(keys, (step.title for step in asked), strict=True))
+    steps = (*(_step(given, key, step, units, titles) for key, step in zip(keys, asked, strict=True)), *more)
     return replace(texts, steps=steps, pose=Pose(as_configuration(given.q)))
 
 
-def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
-    """A step of the file with what the derivation adds to it."""
+def _step(given: Exercise, key: StepKey, step: Step, units: Units, titles: Mapping[StepKey, str]) -> Step:
+    """A step of the file with what the derivation adds to it; `titles` are those of all of its steps."""
     branch, text = given.followed, step.text + words.counts(given.arm, key, units)
     found, ended = branch.derivation.step(key), branch.derivation.failed
     if key == "centre":
@@ -71,13 +75,13 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
         end = Pose(as_configuration(branch.q)) if branch.available and branch.q is not None else None
         practice = f"The numbers below are those of the branch {branch.name}."
         if ended is not None:
-            where = words.title(given.arm, ended.key)
+            where = titles[ended.key]
             practice = f"The branch that you follow, {branch.name}, ends at the step “{where}”."
         practice += " Choose another one with Follow."
         asked = _limits(given)
         return replace(step, text=text, question=asked, end=end, practice=practice, withheld=POSTURES)
     if found is None:
-        where = "" if ended is None else f" It ends at the step “{words.title(given.arm, ended.key)}”."
+        where = "" if ended is None else f" It ends at the step “{titles[ended.key]}”."
         text = f"The branch that you follow does not get here.{where}"
         return replace(step, text=text, offer=_way_back(given))
     if found.failure is not None:

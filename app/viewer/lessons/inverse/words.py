@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from app.exercises.lesson_text import LessonText
 from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Outline, Pose
@@ -31,9 +32,9 @@ def sub(name: str) -> str:
 
 
 @lru_cache(maxsize=64)
-def texts(robot: Robot, units: Units) -> Outline:
+def texts(robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
     """Goal, steps and check of the file, without what the derivation of a target adds."""
-    return outline_of("inverse", robot, units, _facts(robot))
+    return outline_of("inverse", robot, units, _facts(robot), text)
 
 
 def _facts(robot: Robot) -> LessonFacts:

@@ -22,7 +22,7 @@ from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.numeric import basins, views
 from app.viewer.lessons.numeric.drawing import scene
 from app.viewer.lessons.numeric.facts import NumericFacts
-from app.viewer.lessons.numeric.questions import outline
+from app.viewer.lessons.numeric.questions import facts
 from app.viewer.lessons.numeric.settings import NumericSettings
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
@@ -41,7 +41,7 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
     key = "numeric"
     title = "Numeric IK"
     about = "Newton, transpose and damping from a start that you drag: iterates, failures, basins."
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = NumericSettings, NumericFacts
     undo: ClassVar[dict[str, str]] = {"on_take": "Iterate"}
 

@@ -8,9 +8,9 @@ import numpy as np
 from markupsafe import Markup
 
 from app.exports.curves import Curve, Row, with_legend
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.content import LessonFacts
 from app.viewer.lessons.guide.leads import bar
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Lead, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.numeric import iteration
 from app.viewer.lessons.numeric.example import Example, example
@@ -35,11 +35,6 @@ _COMPARED: tuple[Method, ...] = ("newton", "damped")
 
 
 @lru_cache(maxsize=128)
-def outline(robot: Robot, units: Units) -> Outline:
-    """The outline for this arm."""
-    return outline_of("numeric", robot, units, facts(robot, units))
-
-
 def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares."""
     known = example(robot)

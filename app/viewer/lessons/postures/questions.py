@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.exercises.lesson_text import LessonText
 from app.exports.worksheet.sheet import indexed
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Configuration, Ghost, Lead, Outline, Pose
@@ -23,7 +24,6 @@ from kin.units import Units
 
 ROLL = math.radians(30.0)
 BEYOND = 1.2  # lengths of all links: a target that no arm has
-ROUND = "Drive it round"  # the step whose question is made here
 
 
 class Solved(NamedTuple):
@@ -76,12 +76,14 @@ def _exact(robot: Robot, T: Array) -> tuple[IKSolution, ...]:
     return result.solutions if result.status is Status.SOLVED else ()
 
 
-def outline(robot: Robot, units: Units) -> Outline:
+def outline(robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
     """The outline for this arm."""
-    found = outline_of("postures", robot, units, facts(robot, units))
-    if loop_of(robot) is None:
-        return found
-    steps = (replace(one, question=Round(robot, units)) if one.title == ROUND else one for one in found.steps)
+    known = facts(robot, units)
+    found, driven = outline_of("postures", robot, units, known, text), known.poses.get("round")
+    steps = (
+        replace(one, question=Round(robot, units)) if one.end is not None and one.end is driven else one
+        for one in found.steps
+    )
     return replace(found, steps=tuple(steps))
 
 

@@ -24,7 +24,7 @@ from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.drawing import scene
 from app.viewer.lessons.redundancy.facts import RedundancyFacts
-from app.viewer.lessons.redundancy.questions import outline
+from app.viewer.lessons.redundancy.questions import facts
 from app.viewer.lessons.redundancy.ring import Ring
 from app.viewer.lessons.redundancy.settings import MOVING, RedundancySettings
 from app.viewer.null_space import lead, within
@@ -51,7 +51,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
     key = "redundancy"
     title = "Redundancy"
     about = "How seven joints move while the tool stays where it is."
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = RedundancySettings, RedundancyFacts
 
     # What is shown

@@ -9,9 +9,9 @@ import numpy as np
 
 from app.exercises.variant import Quantity
 from app.viewer.lessons.axes import axes_at
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.content import LessonFacts
 from app.viewer.lessons.guide.leads import line
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Lead, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.null_space import lead
 from kin import Robot, fk, jacobian
@@ -24,12 +24,7 @@ STILL = 1e-6
 WAYS, ROOM, PARTS = (math.radians(30.0), math.radians(15.0), math.radians(5.0)), 1.2, 31
 
 
-def outline(robot: Robot, units: Units) -> Outline:
-    """The outline for this arm."""
-    return outline_of("redundancy", robot, units, facts(robot))
-
-
-def facts(robot: Robot) -> LessonFacts:
+def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares; joints count from 1."""
     free, z = free_motions(robot, "pose"), null_vector(robot)
     size = np.abs(z)

@@ -22,7 +22,7 @@ from app.viewer.lessons.rotations import views
 from app.viewer.lessons.rotations.drawing import frames, room
 from app.viewer.lessons.rotations.facts import BY_KEY, RotationsFacts
 from app.viewer.lessons.rotations.frames import MOST, Motion, swapped
-from app.viewer.lessons.rotations.questions import outline
+from app.viewer.lessons.rotations.questions import facts
 from app.viewer.lessons.rotations.settings import MOTIONS, RotationsSettings
 from app.viewer.lessons.rotations.turning import FRAME, Turning
 from app.viewer.lessons.rotations.typed import read_rotation
@@ -43,7 +43,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
     key = "rotations"
     title = "Rotations and frames"
     about = "A rotation in all its forms, gimbal lock, and a chain of frames that you build."
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = RotationsSettings, RotationsFacts
     left: ClassVar[Left] = "pose"
     undo: ClassVar[dict[str, str]] = dict.fromkeys(

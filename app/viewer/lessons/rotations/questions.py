@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from app.exercises.variant import Quantity
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.content import LessonFacts
 from app.viewer.lessons.guide.leads import direction, place, up_or_down
-from app.viewer.lessons.guide.outline import Configuration, Cosine, Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Configuration, Cosine, Lead, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
 from app.viewer.lessons.rotations.drawing import LENGTH, anchor
@@ -31,12 +31,6 @@ TWO_TURNS = Motion(True, 2, math.pi / 2, True), Motion(True, 0, math.pi / 2, Tru
 LOCKED = {"chained": False, "convention": PAGE.key, "angles": [0.4, math.pi / 2, 0.0], "axes": "turns"}
 
 
-@lru_cache(maxsize=128)
-def outline(robot: Robot, units: Units) -> Outline:
-    """The outline for this arm."""
-    return outline_of("rotations", robot, units, facts(robot, units))
-
-
 @lru_cache(maxsize=64)
 def example(robot: Robot) -> Array:
     """A configuration near home in which the tool is turned about all axes, if it can be, all well seen."""
@@ -49,6 +43,7 @@ def example(robot: Robot) -> Array:
     return np.asarray(q[int(np.argmax(seen + least))])
 
 
+@lru_cache(maxsize=128)
 def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares; rows and columns count from 1."""
     q = example(robot)

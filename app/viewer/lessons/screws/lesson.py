@@ -27,9 +27,9 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import GREY
-from app.viewer.lessons.guide.content import AskedFacts, outline_of
+from app.viewer.lessons.guide.content import AskedFacts
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.guide.outline import LEAST, Configuration, Ghost, Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import LEAST, Configuration, Ghost, Lead, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.screws.drawing import GHOST, VELOCITY, foot, scene, tips
 from app.viewer.panel.joints import label
@@ -509,11 +509,7 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
     through = True
     title = "Screws"
     about = "Each joint axis as six numbers, and the pose of the tool as a product of exponentials."
-    settings_of, facts_of = ScrewsSettings, ScrewsFacts
-
-    @staticmethod
-    def outline(robot: Robot, units: Units) -> Outline:
-        return outline_of("screws", robot, units, ScrewsAsked(robot, units))
+    settings_of, facts_of, asked_of = ScrewsSettings, ScrewsFacts, ScrewsAsked
 
     def started(self) -> None:
         self._figure = FigureNodes(body(self.stage.now.robot).size)

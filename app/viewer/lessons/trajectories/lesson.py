@@ -20,7 +20,7 @@ from app.viewer.declared.scene import Lazy, bars
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.trajectories.motions import SAMPLES, ways
-from app.viewer.lessons.trajectories.questions import outline
+from app.viewer.lessons.trajectories.questions import facts
 from app.viewer.scene.meshes import body
 from kin import Robot
 from kin.transforms import Array
@@ -58,7 +58,7 @@ class TrajectoriesLesson(DeclaredFeature[TrajectoriesSettings, TrajectoriesFacts
     key = "trajectories"
     title = "Trajectories"
     about = "How a motion becomes a function of time: profiles, PTP and LIN, singularities, jerk."
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = TrajectoriesSettings, TrajectoriesFacts
 
     def panel(self) -> Sequence[Node]:

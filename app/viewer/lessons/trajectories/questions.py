@@ -9,8 +9,8 @@ import numpy as np
 from markupsafe import Markup
 
 from app.exercises.variant import Quantity
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Lead, Outline, Path, Pose
+from app.viewer.lessons.guide.content import LessonFacts
+from app.viewer.lessons.guide.outline import Lead, Path, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.trajectories import figures
 from app.viewer.lessons.trajectories.motions import (
@@ -36,11 +36,6 @@ LINKS, START, END = (1.0, 0.6), (-1.2, 0.7), (-1.2, -0.3)  # m: two links, and a
 
 
 @lru_cache(maxsize=128)
-def outline(robot: Robot, units: Units) -> Outline:
-    """The lesson for this arm."""
-    return outline_of("trajectories", robot, units, facts(robot, units))
-
-
 def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares."""
     joint, found, between = example(robot), family(robot), ways(robot)

@@ -22,7 +22,7 @@ from app.viewer.lessons.velocity.drawing import force_scale, lost_ends, scene, t
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.jog import BUTTONS, button, step
 from app.viewer.lessons.velocity.null_motion import MOVING, after
-from app.viewer.lessons.velocity.questions import outline
+from app.viewer.lessons.velocity.questions import facts
 from app.viewer.lessons.velocity.settings import FIRST, LARGEST, VelocitySettings
 from app.viewer.scene.gizmo import DragEvent
 from app.viewer.step_out import FINDING, STEP_HINT
@@ -40,7 +40,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     title = "Velocity"
     computes = False
     about = "The velocities and forces of the tool: Jacobian, ellipsoids, singularities."
-    outline = staticmethod(outline)
+    asked_of = staticmethod(facts)
     settings_of, facts_of = VelocitySettings, VelocityFacts
     undo: ClassVar[dict[str, str]] = {"on_jog": "Jog"}
 

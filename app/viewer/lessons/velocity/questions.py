@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 
 from app.exports.worksheet.sheet import indexed
-from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.content import LessonFacts
 from app.viewer.lessons.guide.leads import UP, direction
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
+from app.viewer.lessons.guide.outline import Lead, Pose, SemiAxis
 from app.viewer.lessons.guide.poses import as_configuration, distance, first_clear, moved
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
@@ -27,11 +27,6 @@ LOAD = 10.0  # N
 SAMPLES, SCANNED = 32, 73  # configurations at random, and along the range of a joint
 BENT, ANOTHER = (0.6, -0.6, 1.0), 0.1  # rad, and of the longest semi-axis
 FLAT, CLEAR = 0.06, 2.0  # of the largest σ that was found: what counts as none; home has more than twice as much
-
-
-def outline(robot: Robot, units: Units) -> Outline:
-    """The outline for this arm."""
-    return outline_of("velocity", robot, units, facts(robot, units))
 
 
 def facts(robot: Robot, units: Units) -> LessonFacts:

@@ -23,8 +23,9 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.dh import questions as dh
+from app.viewer.lessons.dh.lesson import DHLesson
 from app.viewer.lessons.equations import questions as equations
+from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.lessons.guide.outline import (
     Choice,
     Mistake,
@@ -43,7 +44,9 @@ from app.viewer.lessons.postures import planar
 from app.viewer.lessons.postures import questions as postures
 from app.viewer.lessons.postures.loop import Round
 from app.viewer.lessons.redundancy import questions as redundancy
+from app.viewer.lessons.redundancy.lesson import RedundancyLesson
 from app.viewer.lessons.velocity import questions as velocity
+from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
 from kin import InputError, Robot
 from kin.differential.task import natural_task, usual_rank
@@ -289,7 +292,7 @@ def frames(robot: Robot, q: Array) -> Array:
 
 @arms("dh")
 def test_dh_numbers(robot: Robot) -> None:
-    outline = dh.outline(robot, DEGREES)
+    outline = DHLesson.outline(robot, DEGREES)
     found = numbers(outline)
     T = frames(robot, robot.q_home)
     assert found["1"] == len(T)
@@ -311,7 +314,7 @@ def test_dh_numbers(robot: Robot) -> None:
 @arms("dh")
 def test_dh_mistake(robot: Robot) -> None:
     """What the table with a wrong sign describes, by poses of that table."""
-    step = dh.outline(robot, DEGREES).steps[5]
+    step = DHLesson.outline(robot, DEGREES).steps[5]
     assert isinstance(step.question, Choice)
     row = int(step.question.prompt.split("in row ")[1].split(",")[0]) - 1
     assert step.question.prompt.split()[2][0] == "α"
@@ -330,7 +333,7 @@ def test_dh_mistake(robot: Robot) -> None:
 
 @arms("dh")
 def test_dh_offsets(robot: Robot) -> None:
-    outline = dh.outline(robot, DEGREES)
+    outline = DHLesson.outline(robot, DEGREES)
     question = outline.check[0]
     assert isinstance(question, Number)
     joint = int(question.prompt.split("joint ")[1].split()[0]) - 1
@@ -343,7 +346,7 @@ def test_dh_offsets(robot: Robot) -> None:
 
 @arms("equations")
 def test_equations_numbers(robot: Robot) -> None:
-    outline = equations.outline(robot, DEGREES)
+    outline = EquationsLesson.outline(robot, DEGREES)
     found, chosen = numbers(outline), rights(outline)
     T = kin.fk(robot, robot.q_home)
     assert found["2"] == pytest.approx(np.linalg.norm(T[:3, 3]))
@@ -421,7 +424,7 @@ def test_only_planar_tables_are_solved_by_hand() -> None:
 
 @arms("redundancy")
 def test_redundancy_numbers(robot: Robot) -> None:
-    found = numbers(redundancy.outline(robot, DEGREES))
+    found = numbers(RedundancyLesson.outline(robot, DEGREES))
     q = robot.random_q(np.random.default_rng(11), 5)
     J = kin.jacobian(robot, q)
     rank = max(np.linalg.matrix_rank(j, tol=1e-9) for j in J)
@@ -431,7 +434,7 @@ def test_redundancy_numbers(robot: Robot) -> None:
     assert np.linalg.norm(kin.jacobian(robot, robot.q_home) @ z) == pytest.approx(0.0, abs=1e-9)
     assert found["c1"] == pytest.approx(0.0, abs=1e-9)
     assert np.linalg.norm(z) == pytest.approx(1.0)
-    question = redundancy.outline(robot, DEGREES).steps[2].question
+    question = RedundancyLesson.outline(robot, DEGREES).steps[2].question
     assert isinstance(question, Choice)
     fastest = {f"Joint {k + 1}" for k in np.flatnonzero(np.abs(z) > np.abs(z).max() - 1e-6)}
     assert {o.text for o in question.options if o.right} <= fastest
@@ -439,7 +442,7 @@ def test_redundancy_numbers(robot: Robot) -> None:
 
 @arms("velocity")
 def test_velocity_numbers(robot: Robot) -> None:
-    outline = velocity.outline(robot, DEGREES)
+    outline = VelocityLesson.outline(robot, DEGREES)
     found, chosen = numbers(outline), rights(outline)
     step = 1e-6
     q, _ = moved(robot, 0, step)
@@ -493,11 +496,11 @@ def test_a_visitor_answers_and_the_link_keeps_it(server: int) -> None:
         tab.wait(lambda: "5. A joint and its column" in tab.html)
         press(tab, ["reveal", "5", 5], None)
         pioneer = ROBOTS[0]
-        end = dh.outline(pioneer, DEGREES).steps[4].end
+        end = DHLesson.outline(pioneer, DEGREES).steps[4].end
         assert end is not None
         tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(pioneer, np.array(end.q)), atol=1e-6))
         assert "The answer." in tab.html
-        press(tab, ["go", 6], len(dh.outline(pioneer, DEGREES).steps))
+        press(tab, ["go", 6], len(DHLesson.outline(pioneer, DEGREES).steps))
         tab.wait(lambda: "0 of 4 right" in tab.html)
         press(tab, ["answer", "c2", 7], 1)
         tab.wait(lambda: "1 of 4 right" in tab.html)

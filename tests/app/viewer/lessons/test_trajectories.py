@@ -13,7 +13,8 @@ from app.exports.curves import WIDTH, Curve, Row, with_legend
 from app.viewer import profiles
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.trajectories import motions
-from app.viewer.lessons.trajectories.questions import END, LINKS, OFFSETS, SPEED, START, outline
+from app.viewer.lessons.trajectories.lesson import TrajectoriesLesson
+from app.viewer.lessons.trajectories.questions import END, LINKS, OFFSETS, SPEED, START
 from kin import Robot
 from kin.units import Units
 
@@ -34,7 +35,9 @@ def test_every_profile_is_as_fast_as_the_limits_allow(robot: Robot) -> None:
 
 
 def test_the_numbers_of_the_steps() -> None:
-    answers = {key: q.answer for key, q in outline(UR5, Units()).questions() if isinstance(q, Number)}
+    answers = {
+        key: q.answer for key, q in TrajectoriesLesson.outline(UR5, Units()).questions() if isinstance(q, Number)
+    }
     cubic = motions.family(UR5)["cubic"]
     _, values = motions.sampled(cubic, 1.0)
     assert answers["2"] == pytest.approx(values[1].max() / (values[0][-1] / cubic.duration), abs=1e-3)
@@ -69,7 +72,7 @@ def test_a_line_goes_through_in_the_posture_that_the_chart_of_postures_says() ->
         last = int(postures.reach[0, row])
         assert np.allclose(postures.q[: last + 1, row, 0], angles[: last + 1], atol=1e-9)
         assert (np.abs(angles) <= np.pi).all() == (last == len(share) - 1)
-    step = next(each for each in outline(UR5, Units()).steps if "posture a line" in each.title)
+    step = next(each for each in TrajectoriesLesson.outline(UR5, Units()).steps if "posture a line" in each.title)
     (stop,) = re.findall(r"joint 1 is at 180° after (\d+) % of the line", step.shown)
     assert float(stop) == pytest.approx(100.0 * last / (len(share) - 1), abs=1.1)
     assert step.question is not None

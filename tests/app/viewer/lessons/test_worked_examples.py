@@ -17,13 +17,12 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 from app.exercises.fields import ExerciseFileError
-from app.exercises.lesson_text import parse_lesson
+from app.exercises.lesson_text import parse_lesson, texts_of
 from app.exercises.worked import WorkedText, configuration
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.content import texts_of
 from app.viewer.lessons.guide.example import MOTION_TIME, PATIENCE, Example, ExampleStep, Player, example_of
 from app.viewer.lessons.guide.example_drawing import walked
 from app.viewer.panel.joints import label

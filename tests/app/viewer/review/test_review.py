@@ -15,6 +15,7 @@ from lesson_arms import arms_of
 from app.classroom.courses import Course, Courses, Item
 from app.classroom.views import Recalled
 from app.exercises import Exercise, Exercises, Verdict
+from app.exercises.lesson_text import texts_of
 from app.exercises.lessons import LESSONS as KEYS
 from app.shared.store import Store
 from app.viewer.activity.activity import REVIEW, Activity, GivenUp
@@ -443,7 +444,7 @@ def test_questions_are_asked_again_on_an_arm_with_other_numbers(lesson: Any) -> 
     outline = lesson.asked(arm, Units())
     moved = 0
     for key, question in outline.questions():
-        found = other_arm(lesson, key, arm.id, random.Random(3))
+        found = other_arm(lesson, texts_of(lesson.key), key, arm.id, random.Random(3))
         if found != arm:
             assert found in arms_of(lesson.key)
             moved += 1
@@ -455,10 +456,14 @@ def test_questions_are_asked_again_on_an_arm_with_other_numbers(lesson: Any) -> 
 
 def test_a_question_that_no_other_arm_has_stays_on_its_arm() -> None:
     screws = next(lesson for lesson in LESSONS if lesson.key == "screws")
-    assert other_arm(screws, "3", "scara", random.Random(1)).id == "scara", "the arm of a single step"
+    assert other_arm(screws, texts_of("screws"), "3", "scara", random.Random(1)).id == "scara", (
+        "the arm of a single step"
+    )
     for arm in ("ur5", "puma560"):
-        assert other_arm(screws, "c99", arm, random.Random(1)).id == arm
-    assert other_arm(screws, "c99", "gone", random.Random(1)).id == "puma560", "the first of the lesson"
+        assert other_arm(screws, texts_of("screws"), "c99", arm, random.Random(1)).id == arm
+    assert other_arm(screws, texts_of("screws"), "c99", "gone", random.Random(1)).id == "puma560", (
+        "the first of the lesson"
+    )
 
 
 # In words

@@ -25,6 +25,7 @@ from app.viewer.lessons.numeric import basins, questions, views
 from app.viewer.lessons.numeric.drawing import COPIES, chosen
 from app.viewer.lessons.numeric.example import example
 from app.viewer.lessons.numeric.iteration import METHODS, Match, Method, Problem, Settings, advance, factors, run
+from app.viewer.lessons.numeric.lesson import NumericLesson
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
@@ -301,7 +302,7 @@ def test_whole_turns_and_limits() -> None:
 def test_numbers_of_the_steps() -> None:
     for robot in arms_of("numeric"):
         known = example(robot)
-        made = questions.outline(robot, DEGREES)
+        made = NumericLesson.outline(robot, DEGREES)
         far = made.steps[0].question
         ends = kin.fk(robot, np.stack([known.start, known.newton.q[-1]]))[:, :3, 3]
         assert far.answer == pytest.approx(np.linalg.norm(ends[1] - ends[0]), abs=1e-9)  # type: ignore[union-attr]

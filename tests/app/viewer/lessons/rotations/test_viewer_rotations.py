@@ -25,6 +25,7 @@ from app.viewer.lessons.guide.outline import Choice, Number
 from app.viewer.lessons.rotations import questions, views
 from app.viewer.lessons.rotations.conventions import CONVENTIONS, PAGE, Angles, Convention, axis_angle
 from app.viewer.lessons.rotations.frames import MOST, Motion, as_json, factors, from_json, places, swapped
+from app.viewer.lessons.rotations.lesson import RotationsLesson
 from app.viewer.lessons.rotations.typed import read_rotation
 from app.viewer.server import ViewerServer
 from kin import InputError, Robot
@@ -231,7 +232,7 @@ def test_gimbal_lock_is_worded() -> None:
 
 @pytest.mark.parametrize("robot", arms_of("rotations"), ids=lambda robot: robot.id)
 def test_numbers_of_the_questions(robot: Robot) -> None:
-    outline = questions.outline(robot, DEGREES)
+    outline = RotationsLesson.outline(robot, DEGREES)
     pose = outline.steps[0].pose
     assert pose is not None
     T = kin.fk(robot, np.array(pose.q))
@@ -256,7 +257,7 @@ def test_numbers_of_the_questions(robot: Robot) -> None:
 def test_the_order_of_two_turns() -> None:
     rights = {
         k: [o.text for o in q.options if o.right]
-        for k, q in questions.outline(arms_of("rotations")[0], DEGREES).questions()
+        for k, q in RotationsLesson.outline(arms_of("rotations")[0], DEGREES).questions()
         if isinstance(q, Choice)
     }
     z = Rotation.from_euler("ZX", [90, 90], degrees=True).as_matrix()[:, 2]

@@ -1,0 +1,84 @@
+"""Lessons in a page whose language is another one, and files that do not fit the arm."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+from app.exercises import shelf
+from app.exercises.lesson_text import lesson_files
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import ViewerServer
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+GERMAN = """
+title = "Tempo"
+about = "Wie schnell."
+[steps."A column"]
+"A column" = "Eine Spalte"
+[controls]
+"Frame" = "Bezug"
+"Base" = "Basis"
+"Tool" = "Werkzeug"
+"Jog" = "Fahren"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(shelf, "EVERY", 0.0)
+    (tmp_path / "velocity.de.toml").write_text(GERMAN, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def server(folder: Path) -> Iterator[int]:
+    with serve_viewer(ViewerServer(Store(), Settings(lessons=folder), Clouds())) as port:
+        yield port
+
+
+def test_a_page_shows_lessons_in_its_language(server: int) -> None:
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        assert "Tempo" not in tab.html
+        tab.set("Language", "Deutsch")
+        tab.wait(lambda: ">Tempo</button>" in tab.html and "Wie schnell." in tab.html)
+        tab.set("Lesson", "Tempo")
+        tab.wait(lambda: "1. Eine Spalte" in tab.html)
+        assert "Not translated yet: “Eine Spalte”, “Turning”" in tab.html
+        assert tab.value("Bezug") == "Basis"
+        tab.set("Bezug", "Werkzeug")
+        tab.settle()
+        kept = tab.stored()
+        tab.set("Language", "English")
+        tab.wait(lambda: "1. A column" in tab.html)
+        assert tab.value("Frame") == "Tool", "the same control"
+        assert "Not translated yet" not in tab.html
+        assert tab.value("Lesson") == "Velocity"
+    memory = json.dumps({"address": "http://127.0.0.1/", "state": kept})
+    with FakeBrowser(server, memory=memory) as tab:
+        tab.wait(lambda: "1. Eine Spalte" in tab.html)
+        assert tab.value("Bezug") == "Werkzeug"
+        tab.set("Lesson", "DH table step by step")
+        tab.wait(lambda: "This lesson is not translated yet." in tab.html)
+
+
+def test_a_file_that_does_not_fit_the_arm_leaves_the_original(
+    folder: Path, server: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    own = lesson_files()["velocity"].read_text(encoding="utf-8")
+    (folder / "velocity.toml").write_text(own.replace('value = "speed"', 'value = "speed/0"', 1), encoding="utf-8")
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "the original is shown" in tab.html)
+        assert "1. A column" in tab.html
+    assert any("steps[0].question.value" in record.message for record in caplog.records)
