@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from kin.errors import InputError
 from kin.kernels import fk as fk_kernels
 from kin.kernels import jacobian as jacobian_kernels
-from kin.kernels.compile import MODEL, direct
+from kin.kernels.compile import direct
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array, is_plain
@@ -36,19 +36,19 @@ class _Compiled:
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.fk_one, MODEL, 1, (4, 4))
+        return direct(fk_kernels.fk_one, 1, 1, (4, 4))
 
     @cached_property
     def fk_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.fk_many, MODEL, 2, (None, 4, 4))
+        return direct(fk_kernels.fk_many, 1, 2, (None, 4, 4))
 
     @cached_property
     def positions_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.positions_many, MODEL, 2, (None, 3))
+        return direct(fk_kernels.positions_many, 1, 2, (None, 3))
 
     @cached_property
     def jacobian_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(jacobian_kernels.jacobian_one, MODEL, 1, (6, None))
+        return direct(jacobian_kernels.jacobian_one, 1, 1, (6, None))
 
 
 _compiled = _Compiled()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.angles import TURN, nearest_image, wrap
-from kin.kernels.compile import MODEL, ROW, direct, inlined, jit, record
+from kin.kernels.compile import direct, inlined, jit
 from kin.kernels.fk import fk_into, fk_many
 from kin.solvers.contract import APPROACH, MASK, POSE
 from kin.solvers.numeric.error import relative_pose
@@ -405,5 +405,4 @@ def _meets(requirement: Requirement, at: Array, targets: Array, i: int, e: Array
 @cache
 def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
     """`measure_and_sort`, which checks its arrays: C-contiguous, and of the types given in `Rows`."""
-    requirement = record(MODEL, 1, 1, 1, 1, 1, int, bool, float, float)
-    return direct(measure_and_sort, requirement, (4, 4), 1, 1, record(2, 2, ROW, ROW, ROW))
+    return direct(measure_and_sort, None, (4, 4), 1, 1, None)

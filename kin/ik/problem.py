@@ -290,7 +290,7 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
 @cache
 def _straighten() -> Callable[[Array, float, Array], float]:
     """`straighten`, which checks its arrays."""
-    return direct(straighten, _POSE, float, _POSE)
+    return direct(straighten, _POSE, None, _POSE)
 
 
 def listed(targets: object) -> list[ArrayLike] | Array:

@@ -22,7 +22,7 @@ from functools import cache
 from importlib.machinery import ExtensionFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 
@@ -37,27 +37,15 @@ _DTYPES = ("f8", "i8", "?", "u8", "f4", "c16")  # in the order of `items` in mod
 _FEATURES = {"v4": ("AVX512_SKX",), "v3": ("AVX2", "FMA3")}
 
 
-class Entry(NamedTuple):
-    """An entry of the extension."""
-
-    module: Any
-    place: int
-
-    def function(self) -> Callable[..., Any]:
-        """The function, which refuses arguments that are not as ``entries.txt`` says."""
-        found: Callable[..., Any] = self.module.entry(self.place)
-        return found
-
-
 @cache
-def entries() -> dict[str, Entry]:
-    """The entries of the extension by the names of their kernels.
+def entries() -> dict[str, Callable[..., Any]]:
+    """The functions of the extension by the names of their kernels; each refuses what ``entries.txt`` excludes.
 
     Raises:
         ImportError: there is no extension, and it cannot be built; says what to do.
     """
     module = loaded(_file())
-    return {name: Entry(module, k) for k, (name, *_) in enumerate(module.entries())}
+    return {name: module.entry(k) for k, (name, *_) in enumerate(module.entries())}
 
 
 def loaded(file: Path, readable: bool = layout.READABLE) -> Any:

@@ -10,9 +10,9 @@ another one than Python's.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cached_property, update_wrapper
-from typing import Any, Final, NamedTuple, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from kin.kernels import ahead
 from kin.kernels.plain import written
 
 C, PYTHON = "c", "python"
-MODEL = "model"
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 
 
@@ -52,7 +51,7 @@ class Kernel:
     @cached_property
     def _call(self) -> Callable[..., Any]:
         entry = None if PLAIN else ahead.entries().get(self.name)
-        return written(self.py_func) if entry is None else entry.function()
+        return entry or written(self.py_func)
 
 
 def jit(function: _Kernel) -> _Kernel:
@@ -79,86 +78,28 @@ def joined(function: _Kernel) -> _Kernel:
     return jit(function)
 
 
-class Wanted(NamedTuple):
-    """An array as a kernel wants it: its shape, None for an axis of any length.
-
-    Attributes:
-        checked: whether it is an array of floats that `direct` checks where the extension does not do it.
-    """
-
-    shape: tuple[int | None, ...]
-    checked: bool = True
-
-
-ROW: Final = Wanted((None,), checked=False)  # an array with one axis, of integers or bools
-
-
-class Record(NamedTuple):
-    """A named tuple as an argument of `direct`."""
-
-    fields: tuple[Any, ...]
-
-
-def record(*fields: Any) -> Record:
-    """A named tuple, for `direct`; its fields are numbers of axes, `MODEL`, `ROW` or types of numbers."""
-    return Record(fields)
-
-
-def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
+def direct(kernel: Any, *arrays: int | tuple[int | None, ...] | None) -> Callable[..., Any]:
     """A kernel as a function that is called without a detour.
 
     Args:
-        arguments: for a C-contiguous float64 array (which may be read-only unless the kernel writes to it) its
-            number of axes, or its shape, in which None stands for any length. `MODEL` stands for `Robot.model`,
-            `ROW` for an array of integers or bools; `float`, `int` and `bool` for a number; `record` for a named
-            tuple.
+        arrays: of each argument what plain Python checks, as the extension does by itself: of a C-contiguous
+            float64 array its shape, in which None stands for any length, or its number of axes. None: nothing.
 
     Returns:
-        The function. It raises `TypeError` for an array argument that is not as described: callers need not check
-        it, and deal with whatever else they accept when that happens.
-
-    Raises:
-        ImportError: the extension has no such entry.
+        The function. It raises `TypeError` for an array that is not as described: callers need not check it, and
+        deal with whatever else they accept when that happens.
     """
-    if PLAIN:
-        return checked(kernel, list(_wanted(arguments)))
-    entry = ahead.entries().get(kernel.name)
-    if entry is None:
-        raise ImportError(f"the extension has no entry {kernel.name}")
-    return entry.function()
-
-
-def _wanted(arguments: tuple[Any, ...]) -> Iterator[Wanted | None]:
-    """The arrays among the arguments of `direct`, and None for each number."""
-    for argument in arguments:
-        match argument:
-            case Record(fields):
-                yield from (each and each._replace(checked=False) for each in _wanted(fields))
-            case Wanted():
-                yield argument
-            case type():
-                yield None
-            case tuple():
-                yield Wanted(argument)
-            case _:
-                yield Wanted((None,) * (1 if argument == MODEL else argument))
-
-
-def checked(function: Callable[..., Any], wanted: list[Wanted | None]) -> Callable[..., Any]:
-    """A function that checks the arrays that it is given as an entry of the extension does."""
+    if not PLAIN and (entry := ahead.entries().get(kernel.name)) is not None:
+        return entry
+    shapes = [(None,) * each if isinstance(each, int) else each for each in arrays]
 
     def call(*arguments: Any) -> Any:
-        for value, array in zip(_flat(arguments), wanted, strict=True):
-            if array is not None and array.checked and not fits(value, array.shape):
-                raise TypeError(f"{value!r} is not a C-contiguous float64 array {array.shape}")
-        return function(*arguments)
+        for value, shape in zip(arguments, shapes, strict=True):
+            if shape is not None and not fits(value, shape):
+                raise TypeError(f"{value!r} is not a C-contiguous float64 array {shape}")
+        return kernel(*arguments)
 
     return call
-
-
-def _flat(arguments: tuple[Any, ...]) -> Iterator[Any]:
-    for each in arguments:
-        yield from _flat(each) if isinstance(each, tuple) else (each,)
 
 
 def fits(value: object, shape: tuple[int | None, ...]) -> bool:

@@ -159,8 +159,8 @@ class BatchKernels:
 
     def unchecked(self) -> BatchKernels:
         """The same, whose arrays are checked (`kin.kernels.compile.direct`): another one is a `TypeError`."""
-        many = direct(self.many, 1, 3, 1, 1, 3)
-        return replace(self, one=direct(self.one, 1, (4, 4), float, 1, 2), many=many)
+        one, many = direct(self.one, 1, (4, 4), None, 1, 2), direct(self.many, 1, 3, 1, 1, 3)
+        return replace(self, one=one, many=many)
 
 
 class PlainKernels(BatchKernels):

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from kin.angles import wrap, wrapped
 from kin.axes import size
-from kin.kernels.compile import MODEL, ROW, direct, jit
+from kin.kernels.compile import direct, jit
 from kin.kernels.dense import least_pivot, singular_values
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
@@ -204,7 +204,7 @@ def follow(
 @cache
 def _nearly_singular() -> Callable[[Array, int, float, Whole, Array], int]:
     """`nearly_singular`, which checks its arrays."""
-    return direct(nearly_singular, MODEL, int, float, ROW, 2)
+    return direct(nearly_singular, 1, None, None, None, 2)
 
 
 @lru_cache(maxsize=256)

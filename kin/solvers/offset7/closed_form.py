@@ -47,7 +47,7 @@ _OBSTACLES: dict[int, ObstacleCode] = {
 @cache
 def _answer() -> Callable[[Array, Array, Array, float, bool, float, Array, Array], int]:
     """`answer`, which checks its arrays."""
-    return direct(answer, 1, 2, 2, float, bool, float, 2, 2)
+    return direct(answer, 1, 2, 2, None, None, None, 2, 2)
 
 
 def match(robot: Robot) -> Offset7 | None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from kin.angles import TURN, apart, wrapped
 from kin.axes import size
 from kin.fk import fk, jacobian
-from kin.kernels.compile import MODEL, direct
+from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
@@ -423,10 +423,10 @@ def _are_alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
 @cache
 def _ends() -> Callable[..., None]:
     """`move_ends`, which checks its arrays."""
-    return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 3, 3, 2, 1)
+    return direct(move_ends, 1, (4, 4), 1, 2, 2, 3, 3, 2, 1)
 
 
 @cache
 def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int]:
     """`choose_rows`, which checks its arrays."""
-    return direct(choose_rows, MODEL, (4, 4), 1, 2, 2, 3, 2)
+    return direct(choose_rows, 1, (4, 4), 1, 2, 2, 3, 2)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels.compile import MODEL, ROW, direct, record
+from kin.kernels.compile import direct
 from kin.solvers.selfmotion.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.transforms import Array
 
@@ -45,4 +45,4 @@ class Motions:
 @cache
 def _trace() -> Callable[..., int]:
     """`trace`, which checks its arrays."""
-    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(2, ROW), 2, 3)
+    return direct(trace, 1, (4, 4), 1, 2, None, 2, None, 2, 3)

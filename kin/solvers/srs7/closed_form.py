@@ -39,7 +39,7 @@ _THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
 @cache
 def _answer() -> Callable[[Array, Array, float, bool, bool, Array, Array, Array, Array], int]:
     """`answer`, which checks its arrays."""
-    return direct(answer, 1, 2, float, bool, bool, 2, 2, 2, 1)
+    return direct(answer, 1, 2, None, None, None, 2, 2, 2, 1)
 
 
 def match(robot: Robot) -> Srs7 | None:

@@ -22,7 +22,6 @@ import pytest
 import kin
 from kin.kernels import ahead
 from kin.kernels import compile as chosen
-from kin.kernels.compile import Wanted, checked
 
 
 @pytest.fixture
@@ -169,8 +168,9 @@ def test_the_best_level_comes_first(monkeypatch, machine, features, expected):
     assert list(ahead.levels()) == expected
 
 
-def test_plain_functions_check_arrays_as_compiled_ones_do():
-    total = checked(lambda a, x: a.sum() * x, [Wanted((2, None)), None])
+def test_plain_functions_check_arrays_as_compiled_ones_do(monkeypatch):
+    monkeypatch.setattr(chosen, "PLAIN", True)
+    total = chosen.direct(lambda a, x: a.sum() * x, (2, None), None)
     assert total(np.ones((2, 3)), 2.0) == 12.0
     for wrong in (np.ones((3, 2)), np.ones((2, 3), int), [[1.0], [2.0]], np.ones((2, 4))[:, ::2]):
         with pytest.raises(TypeError, match=r"array \(2, None\)"):

@@ -18,11 +18,11 @@ import pytest
 import kin
 from kin import InputError
 from kin.kernels import fk as fk_kernels
-from kin.kernels.compile import MODEL, direct, fits
+from kin.kernels.compile import direct, fits
 
 ROBOT = kin.get_robot("pioneer5")
 Q = np.array([0.3, -0.4, 0.5, 0.6, -0.7])
-ENTRY = direct(fk_kernels.fk_one, MODEL, 1, (4, 4))
+ENTRY = direct(fk_kernels.fk_one, 1, 1, (4, 4))
 
 
 class Array(np.ndarray):
