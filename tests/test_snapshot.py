@@ -17,8 +17,6 @@ import json
 import math
 import re
 import struct
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,7 +45,6 @@ TIED = {"redundant7: beyond a stop", "stanford: in front, tool down"}
 VOLATILE = {"version", "pid", "date", "x-request-id", "content-length"}  # fields that may change at any time
 HEADERS = ("content-type", "content-disposition", "x-cloud-count", "x-cloud-columns", "allow", "retry-after")
 WIDTH = 115
-UNTIL = 60  # seconds a process of its own may take
 
 
 # -- the parts of the tables -----------------------------------------------------------------------------------
@@ -85,13 +82,11 @@ class Command:
     Args:
         files: what is in the working directory, by name.
         writes: a file that is read back afterwards.
-        process: in a process of its own.
     """
 
     words: str
     files: dict[str, str] = field(default_factory=dict)
     writes: str | None = None
-    process: bool = False
 
 
 Request = Rest | Command
@@ -753,7 +748,6 @@ CLI: dict[str, Request] = {
     "fk, frames": Command("fk pioneer5 90 30 60 30 30 --frames"),
     "fk, radians": Command("fk pioneer5 1.5 0.5 1 0.5 0.5 --rad --frames"),
     "fk, JSON": Command("fk pioneer5 90 30 60 30 30 --json"),
-    "fk, a process": Command("fk pioneer5 90 -30 60 30 30", process=True),
     "fk, negative numbers": Command("fk pioneer5 -90 -.5 -1e-3 −10 +5"),
     "fk of a further arm": Command("fk slider 90 120 --robots .", files={"slider.toml": SLIDER}),
     "fk of a further arm, metres": Command("fk slider 1.5 0.12 --rad --robots .", files={"slider.toml": SLIDER}),
@@ -761,7 +755,6 @@ CLI: dict[str, Request] = {
     "ik, radians": Command("ik pioneer5 --position 0.045 0.191 -0.211 --approach -0.31 -0.164 -0.936 --rad --all"),
     "ik, JSON": Command(f"ik pioneer5 {WHERE} --json"),
     "ik, JSON, radians": Command("ik scara --position 0.3 0.2 0.25 --rad --json"),
-    "ik, a process": Command(f"ik pioneer5 {WHERE} --all", process=True),
     "ik, blocked": Command("ik pioneer5 --position 45 191 100 --approach 0 0 1"),
     "ik, blocked, radians": Command("ik pioneer5 --position 0.045 0.191 0.1 --approach 0 0 1 --rad"),
     "ik, blocked, limits ignored": Command(
@@ -785,7 +778,6 @@ CLI: dict[str, Request] = {
     "robots, JSON": Command("robots pioneer5 --json"),
     "robots, radians": Command("robots scara --rad"),
     "robots, further": Command("robots --robots .", files={"slider.toml": SLIDER}),
-    "robots, a process": Command("robots", process=True),
     "check, radians": Command("check {robots}/scara.toml --rad"),
     "check, JSON": Command("check {robots}/puma560.toml --json"),
     "check, odd": Command("check odd.toml", files={"odd.toml": ODD}),
@@ -912,13 +904,8 @@ def ask_command(command: Command, folder: Path, capsys: Any) -> dict[str, Any]:
     words = [
         word.replace("~", " ").replace("{robots}", str(ROOT / "kin" / "robots")) for word in command.words.split()
     ]
-    if command.process:
-        line = [sys.executable, "-m", "app.cli", *words]
-        done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=UNTIL, check=False)
-        code, out, err = done.returncode, done.stdout, done.stderr
-    else:
-        code = cli.main(words)
-        out, err = capsys.readouterr()
+    code = cli.main(words)
+    out, err = capsys.readouterr()
     answer: dict[str, Any] = {"code": code, "out": _printed(out, "--json" in words), "err": err.splitlines()}
     if "--help" in words:  # where lines are broken, and how often metavars are reported, is Python's own affair
         answer["out"] = re.sub(r"(-\w) [A-Z]+, (--\w)", r"\1, \2", " ".join(out.split()))

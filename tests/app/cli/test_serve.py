@@ -34,6 +34,17 @@ def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
     assert given[0].port == 0
 
 
+def test_a_service_whose_kernels_cannot_be_loaded_does_not_start_and_says_why(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object) -> None:
+        raise ImportError("kernels cannot be compiled: there is no clang")
+
+    monkeypatch.setattr("app.service.main.fk", fail)
+    assert main(["serve", "--port", "0"]) == 2
+    assert capsys.readouterr().err == "kinboard: kernels cannot be compiled: there is no clang\n"
+
+
 @pytest.mark.parametrize(("given", "processes"), [({}, 3), ({"compute": 0}, 0), ({"compute": 5}, 5)])
 def test_one_fewer_compute_than_there_are_processors(
     monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], processes: int
