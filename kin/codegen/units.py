@@ -126,7 +126,7 @@ def translated(chosen: Iterable[Entry], checked: bool = False) -> tuple[str, lis
     All but the functions of the entries are static. The text needs nothing but the mathematical library.
 
     Args:
-        checked: whether each index is compared with its axis; one outside is told to `kinboard_outside`.
+        checked: whether each index is compared with its axis; one outside is reported to `kinboard_outside`.
 
     Raises:
         OutsideSubsetError: a construct that no C is written of.

@@ -202,7 +202,7 @@ class LessonChoice:
 
     def _keep(self, lesson: str, guide: Guide) -> None:
         """Keep the progress in a lesson that is closed."""
-        key = lesson, guide.lesson_arm.id
+        key = lesson, guide.arm.id
         self._left.pop(key, None)
         self._left[key] = guide.state()
         while len(self._left) > KEPT:

@@ -47,7 +47,7 @@ class Guide(Feature):
         following: the title of the lesson that comes after this one; "": none does.
 
     Attributes:
-        lesson_arm: the arm that it asks about, which need not be on show; a step may be about another one.
+        arm: the arm that it asks about, which need not be on show; a step may be about another one.
         misplaced: whether a state was restored of an arm that it no longer asks about.
     """
 
@@ -78,11 +78,11 @@ class Guide(Feature):
     ) -> None:
         super().__init__(stage)
         self._lesson, self._following = lesson, following
-        self.lesson_arm = arm_for(stage.activity.text(lesson.key), stage.now.robot)
+        self.arm = arm_for(stage.activity.text(lesson.key), stage.now.robot)
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
         self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
-        self._arms: dict[Robot, Progress] = {self.lesson_arm: self._progress}  # what was answered on each
+        self._arms: dict[Robot, Progress] = {self.arm: self._progress}  # what was answered on each
         self._drawing = Drawing(stage.client.scene, self.post)
         self._copies = SceneView(stage.client.scene, "answer", self.post)
         self._answer_ends = np.zeros((0, 3))  # what the picture has to contain to show the last answer
@@ -178,7 +178,7 @@ class Guide(Feature):
     def asked_about(self) -> Robot:
         """The arm that the step on show, or the check, is about."""
         steps, at = self._progress.outline.steps, self._progress.at
-        return (steps[at].about if at < len(steps) else None) or self.lesson_arm
+        return (steps[at].about if at < len(steps) else None) or self.arm
 
     @property
     def _arm_ids(self) -> tuple[str, ...]:
@@ -214,7 +214,7 @@ class Guide(Feature):
 
     def _ask_about(self, robot: Robot) -> None:
         """Go on with the questions about another arm that the file names, at the same step."""
-        at, before, self.lesson_arm = self._progress.at, self._progress.outline, robot
+        at, before, self.arm = self._progress.at, self._progress.outline, robot
         outline = self._outline()
         self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
         self._progress = self._arms.setdefault(robot, Progress(outline))
@@ -244,14 +244,14 @@ class Guide(Feature):
         return {
             **self._progress.state(),
             "joints": self._joints is not None,
-            **({} if self.lesson_arm.id == self.stage.now.robot.id else {"arm": self.lesson_arm.id}),
+            **({} if self.arm.id == self.stage.now.robot.id else {"arm": self.arm.id}),
             **({"earlier": drawn} if drawn else {}),
         }
 
     def restore(self, state: dict[str, object]) -> None:
         self._example.close()
         arms, arm = self._arm_ids, state.get("arm")
-        if isinstance(arm, str) and arm in arms and arm != self.lesson_arm.id:
+        if isinstance(arm, str) and arm in arms and arm != self.arm.id:
             self._ask_about(self.stage.store.get(arm))
         exercises = self.stage.activity.courses.exercises
         self._earlier[self._progress] = earlier.read(state.get("earlier"), exercises)
@@ -280,7 +280,7 @@ class Guide(Feature):
 
     def _outline(self) -> Outline:
         text = self.stage.activity.text(self._lesson.key)
-        return self._lesson.outline_in(self.lesson_arm, self.stage.units, text)
+        return self._lesson.outline_in(self.arm, self.stage.units, text)
 
     # Answers
 
@@ -428,12 +428,12 @@ class Guide(Feature):
             activity.changed()
         right, count = progress.score
         if right == count > 0:
-            activity.pass_lesson(self._lesson.key, self.lesson_arm.id, self._arm_ids)
+            activity.pass_lesson(self._lesson.key, self.arm.id, self._arm_ids)
         open_ = [key for key in progress.questions if self._is_on_show(key)]
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline))
         offered = "" if here else self.asked_about.name
         sheets = {key: self._sheet(key) for key in open_}
-        of = f"{self._lesson.key} {self.lesson_arm.id}"
+        of = f"{self._lesson.key} {self.arm.id}"
         update_html(self._steps, views.steps_html(progress, sheets, of, offered, self._leading_on()))
         forms = {key: progress.question(key).asked() for key in open_ if here and not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
