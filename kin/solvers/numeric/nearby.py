@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,7 +30,8 @@ _FLOOR = 1e-12  # of the dual problem's matrix, as a share of its largest entry
 _TIGHT, _MET = 1e-13, 1e-11  # what steps back aim for, and what counts as met; of E, metres
 _SHORTEST, _GAIN = 1e-3, 1e-10  # a share of a step; a share of the squared distance that is worth another step
 
-Linear = Callable[[Any, Array, Array, Array], float]
+_Task = TypeVar("_Task")
+Linear = Callable[[_Task, Array, Array, Array], float]
 
 
 @jit
@@ -88,8 +89,8 @@ def _foot(J: Array, e: Array, q: Array, aim: Array, scale: Array, low: Array, hi
 
 @joined
 def back_onto(
-    linear: Linear, task: Any, bounds: tuple[Array, Array], scale: Array, work: tuple[Array, Array, Array],
-    q: Array,
+    linear: Linear[_Task], task: _Task, bounds: tuple[Array, Array], scale: Array,
+    work: tuple[Array, Array, Array], q: Array,
 ) -> float:  # fmt: skip
     """Move q ``(n,)``, in place, by shortest steps inside its bounds onto a task; returns the error that is left.
 
@@ -110,8 +111,8 @@ def back_onto(
 
 @joined
 def move_towards(
-    linear: Linear, task: Any, rows: int, near: tuple[Array, Array], bounds: tuple[Array, Array], scale: Array,
-    q: Array,
+    linear: Linear[_Task], task: _Task, rows: int, near: tuple[Array, Array], bounds: tuple[Array, Array],
+    scale: Array, q: Array,
 ) -> bool:  # fmt: skip
     """Move q ``(n,)``, in place, along the configurations inside its bounds that meet a task towards a box.
 
