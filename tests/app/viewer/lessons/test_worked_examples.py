@@ -507,6 +507,7 @@ def test_a_wrong_button_is_refused_and_changes_nothing(server: int) -> None:
 # The file
 
 SMALL = """
+arms = ["pioneer5"]
 goal = "You can count."
 [facts]
 [[steps]]
