@@ -1,6 +1,6 @@
 """The source of a kernel, and what its names mean.
 
-A name of a module is looked up where Python would, in the globals of the function: so constants, tables and
+A name is looked up where Python would, around the function and in its globals: so constants, tables and
 tolerances are those with which the tests run. Whatever is outside the subset raises `OutsideSubsetError`, which
 says where, what, and what to write instead: nothing is passed on in the hope that a language might know it.
 """
@@ -24,6 +24,7 @@ import numpy as np
 from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, SINGLE, WORD, Constants, Scalar, TupleOf, Type
 from kin.kernels import simd
 from kin.kernels.compile import inlined, joined
+from kin.kernels.plain import names_around
 
 MISSING = object()
 _INLINED = {inlined.__name__, joined.__name__}
@@ -96,6 +97,7 @@ class Scope:
 
     def __init__(self, function: FunctionType, kernels: Mapping[str, FunctionType | Constants]) -> None:
         self.function, self.tree, self.kernels = function, tree_of(function), kernels
+        self.around = names_around(function)
         names = [n.id for n in ast.walk(self.tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
         self.own = {*names, *(each.arg for each in self.tree.args.args)}
         self.never_negative = self._never_negative()
@@ -112,7 +114,7 @@ class Scope:
             case ast.Name() if node.id in self.own:
                 return self.kernels.get(node.id, MISSING)
             case ast.Name():
-                found = self.function.__globals__.get(node.id, MISSING)
+                found = self.around.get(node.id, self.function.__globals__.get(node.id, MISSING))
                 return getattr(builtins, node.id, MISSING) if found is MISSING else plain(found)
             case ast.Attribute():
                 base = self.constant(node.value)

@@ -11,6 +11,7 @@ import __future__
 import ast
 import inspect
 import math
+import textwrap
 from collections.abc import Callable
 from types import FunctionType, SimpleNamespace
 from typing import Any
@@ -23,7 +24,7 @@ _LEAST = -(1 << 63)
 
 def written(function: FunctionType) -> Callable[..., Any]:
     """A kernel as it is written, with the arithmetic of compiled ones."""
-    tree = ast.parse(inspect.getsource(function))
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     ast.increment_lineno(tree, function.__code__.co_firstlineno - 1)
     (definition,) = tree.body
     assert isinstance(definition, ast.FunctionDef)
@@ -31,8 +32,10 @@ def written(function: FunctionType) -> Callable[..., Any]:
     changed = ast.fix_missing_locations(_Arithmetic().visit(tree))
     flags = __future__.annotations.compiler_flag
     scope: dict[str, Any] = {}
-    function.__globals__[_NAME] = _FUNCTIONS
-    exec(compile(changed, function.__code__.co_filename, "exec", flags), function.__globals__, scope)
+    around = names_around(function)
+    names = function.__globals__ | around if around else function.__globals__
+    names[_NAME] = _FUNCTIONS
+    exec(compile(changed, function.__code__.co_filename, "exec", flags), names, scope)
     made = scope[function.__name__]
 
     def call(*arguments: Any) -> Any:
@@ -40,6 +43,12 @@ def written(function: FunctionType) -> Callable[..., Any]:
             return made(*arguments)
 
     return call
+
+
+def names_around(function: FunctionType) -> dict[str, Any]:
+    """What a function that another one has made uses of that one, by its names."""
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    return dict(zip(function.__code__.co_freevars, cells, strict=True))
 
 
 class _Arithmetic(ast.NodeTransformer):

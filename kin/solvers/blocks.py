@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.fk import BLOCK, all_finite_pose
 from kin.kernels.simd import atan2, rounded, widest, wrapped
 from kin.solvers.common import UNBOUNDED, clear
+from kin.solvers.contract import Many, One, Seeded
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -46,42 +48,9 @@ Angles = Callable[[Arc, Array, Array, int, Array], None]
 Store = Callable[[Array, Array, int, Array], None]
 # Of params, T, value, seed, lower, upper, arcs, out: gap in metres, and number of arcs, −1 if nothing is free.
 Careful = Callable[[Array, Array, float, Array, Array, Array, Array, Array], tuple[float, int]]
+_Function = TypeVar("_Function", bound=Callable[..., object])
 Entries = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 Vector = tuple[float, float, float]
-
-
-@joined
-def solve_each(
-    solve: Callable[..., object], request: object, layout: tuple[int, int], params: Array, T: Array, seeds: Array,
-    limits: tuple[Array, Array], out: Array,
-) -> None:  # fmt: skip
-    """out ``(N, branches, n)`` ← what a family's kernel `solve` finds of each of the targets T ``(N, 4, 4)``.
-
-    request: its argument before the seed. layout: most arcs, columns of its rows. seeds ``(N, n)``, or ``(1, n)``
-    for all; limits: lower, upper ``(n,)``.
-    """
-    arcs, rows = np.empty((layout[0], 3)), np.empty((out.shape[1], layout[1]))
-    lower, upper = limits
-    last = seeds.shape[0] - 1
-    for i in range(T.shape[0]):
-        solve(params, T[i], request, seeds[min(i, last)], lower, upper, arcs, rows)
-        for r in range(out.shape[1]):
-            for c in range(out.shape[2]):
-                out[i, r, c] = rows[r, c]
-
-
-@joined
-def in_turn(
-    one: Callable[[Array, Array, float, Array, Array], bool], params: Array, T: Array, values: Array, near: Array,
-    out: Array,
-) -> None:  # fmt: skip
-    """out ``(N, branches, n)`` ← what a kernel finds of each of the targets T ``(N, 4, 4)``, one after another.
-
-    For families without lanes. values: one for each ``(N,)``, or one for all ``(1,)``.
-    """
-    last = values.shape[0] - 1
-    for i in range(T.shape[0]):
-        one(params, T[i], values[min(i, last)], near, out[i])
 
 
 @joined
@@ -147,71 +116,93 @@ def regular(
     return True
 
 
-@joined
-def one(
-    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
-    request: tuple[float, Array], out: Array,
-) -> bool:  # fmt: skip
-    """out ``(branches, n)`` ← all branches of T ``(4, 4)``, without limits. False if T is not finite.
+def kernels_in_lanes(
+    module: str, pairs: Pairs, angles: Angles, store: Store, careful: Careful, rows: int, size: int
+) -> tuple[One, Many, Careful, Seeded]:
+    """The kernels of a family in lanes: attributes of its module with the names that they have here.
 
-    layout, request: as in `regular`.
+    `branches_one` and `branches_many` are those of `kin.solvers.contract.BatchKernels`, which have no limits, and
+    `solve_many` is its `seeded`, which leaves out what has a free joint. `solve_one` is as `careful`, which it
+    asks where a target is singular; further columns of its out are NaN elsewhere.
+
+    Args:
+        rows, size: how many rows S has, and how many pairs.
     """
-    value, near = request
-    if not regular(pairs, angles, store, layout, params, T, request, out):
+
+    def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+        if not regular(pairs, angles, store, (rows, size), params, T, (value, near), out):
+            limits = unbounded(near.shape[0])
+            careful(params, T, value, near, limits[0], limits[1], out[:0], out)
+        return all_finite_pose(T)
+
+    def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+        widest()
         limits = unbounded(near.shape[0])
-        careful(params, T, value, near, limits[0], limits[1], out[:0], out)
-    return all_finite_pose(T)
+        around = (values, near.reshape(1, near.shape[0]), limits[0], limits[1])
+        each(pairs, angles, store, careful, (rows, True), params, T, around, out)
+
+    def solve_one(
+        params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+    ) -> tuple[float, int]:
+        if regular(pairs, angles, store, (rows, size), params, T, (value, near), out):
+            reached = False
+            for i in range(out.shape[0]):
+                reached = reached or not math.isnan(out[i, 0])
+                for j in range(near.shape[0], out.shape[1]):
+                    out[i, j] = math.nan
+            if reached:
+                return 0.0, -1
+        return careful(params, T, value, near, lower, upper, arcs, out)
+
+    def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+        widest()
+        request = (np.full(1, math.nan), seeds, lower, upper)
+        each(pairs, angles, store, careful, (rows, False), params, T, request, out)
+
+    return (
+        _kernel(module, branches_one),
+        _kernel(module, branches_many),
+        _kernel(module, solve_one),
+        _kernel(module, solve_many),
+    )
 
 
-@joined
-def many(
-    pairs: Pairs, angles: Angles, store: Store, careful: Careful, rows: int, params: Array, T: Array,
-    request: tuple[Array, Array], out: Array,
-) -> None:  # fmt: skip
-    """out ``(N, branches, n)`` ← all branches of each of the targets T ``(N, 4, 4)``, without limits.
+def one_after_another(branches_one: One) -> Many:
+    """`branches_many` of a family without lanes, in the module of its `branches_one`."""
 
-    request: a value for each target ``(N,)``, or one for all ``(1,)``; the configuration ``(n,)`` to stay near.
+    def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+        last = values.shape[0] - 1
+        for i in range(T.shape[0]):
+            branches_one(params, T[i], values[min(i, last)], near, out[i])
+
+    return _kernel(branches_one.__module__, branches_many)
+
+
+def each_solved(solve: Callable[..., object], request: object, arcs: int, more: int = 0) -> Seeded:
+    """`solve_many` of a family without lanes, in the module of its kernel for one target.
+
+    Args:
+        solve: of params, T, request, seed, lower, upper, arcs, out.
+        arcs: how many rows those have at most.
+        more: columns of out after the joint values.
     """
-    values, near = request
-    limits = unbounded(near.shape[0])
-    around = (values, near.reshape(1, near.shape[0]), limits[0], limits[1])
-    each(pairs, angles, store, careful, (rows, True), params, T, around, out)
+
+    def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+        found, rows = np.empty((arcs, 3)), np.empty((out.shape[1], out.shape[2] + more))
+        last = seeds.shape[0] - 1
+        for i in range(T.shape[0]):
+            solve(params, T[i], request, seeds[min(i, last)], lower, upper, found, rows)
+            for r in range(out.shape[1]):
+                for c in range(out.shape[2]):
+                    out[i, r, c] = rows[r, c]
+
+    return _kernel(solve.__module__, solve_many)
 
 
-@joined
-def solved(
-    pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
-    request: tuple[float, Array, Array, Array, Array], out: Array,
-) -> tuple[float, int]:  # fmt: skip
-    """out ``(branches, ≥ n)`` ← all branches of T ``(4, 4)`` inside limits: (gap in metres, number of arcs).
-
-    layout: as in `regular`. request: the value, the seed, lower and upper limits ``(n,)``, and where the arcs
-    go. Further columns are NaN where the target is regular.
-    """
-    value, near, lower, upper, arcs = request
-    if regular(pairs, angles, store, layout, params, T, (value, near), out):
-        reached = False
-        for i in range(out.shape[0]):
-            reached = reached or not math.isnan(out[i, 0])
-            for j in range(near.shape[0], out.shape[1]):
-                out[i, j] = math.nan
-        if reached:
-            return 0.0, -1
-    return careful(params, T, value, near, lower, upper, arcs, out)
-
-
-@joined
-def solved_many(
-    pairs: Pairs, angles: Angles, store: Store, careful: Careful, rows: int, params: Array, T: Array,
-    around: tuple[Array, Array, Array], out: Array,
-) -> None:  # fmt: skip
-    """out ``(N, branches, n)`` ← what `solved` finds of each of T ``(N, 4, 4)``, NaN where something is free.
-
-    around: seeds ``(N, n)``, or ``(1, n)`` for all, and lower and upper limits ``(n,)``.
-    """
-    seeds, lower, upper = around
-    request = (np.full(1, math.nan), seeds, lower, upper)
-    each(pairs, angles, store, careful, (rows, False), params, T, request, out)
+def _kernel(module: str, function: _Function) -> _Function:
+    """A function that was made here as a kernel of another module."""
+    function.__module__, function.__qualname__ = module, function.__name__
+    return jit(function)
 
 
 @jit

@@ -51,6 +51,7 @@ everywhere, and nothing else has confirmed it. ``unknown``: some may be missing.
 _STRENGTHS: tuple[Completeness, ...] = get_args(Completeness)
 One = Callable[[Array, Array, float, Array, Array], bool]
 Many = Callable[[Array, Array, Array, Array, Array], None]
+Seeded = Callable[[Array, Array, Array, Array, Array, Array], None]
 
 
 class RedundancyParameter(NamedTuple):
@@ -155,7 +156,7 @@ class BatchKernels:
     params: Array
     one: One
     many: Many
-    seeded: Callable[[Array, Array, Array, Array, Array, Array], None] | None = field(default=None, kw_only=True)
+    seeded: Seeded | None = field(default=None, kw_only=True)
 
     def unchecked(self) -> BatchKernels:
         """The same, whose arrays are checked (`kin.kernels.compile.direct`): another one is a `TypeError`."""

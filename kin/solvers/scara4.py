@@ -25,7 +25,7 @@ from kin.axes import frame_of, is_along, is_zero, lines_of, perpendicular_to
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
-from kin.solvers.blocks import OWN, Arc, double, elbow_of, in_base, many, one, rows_of, single, solved, solved_many
+from kin.solvers.blocks import OWN, Arc, double, elbow_of, in_base, kernels_in_lanes, rows_of, single
 from kin.solvers.canonical import pose_params, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum
 from kin.solvers.contract import (
@@ -248,36 +248,9 @@ def _careful(
     return _branches(params, T, (POSE, value), near, lower, upper, arcs, out)
 
 
-@jit
-def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(2, n)`` ← both branches of the target T ``(4, 4)``; False if T is not finite."""
-    return one(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, (value, near), out)
-
-
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 2, n)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    widest()
-    many(_pairs, _angles, _store, _careful, _ROWS, params, T, (values, near), out)
-
-
-@jit
-def _solve_one(
-    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `_careful`, which is called where T ``(4, 4)`` is singular."""
-    request = (value, near, lower, upper, arcs)
-    return solved(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, request, out)
-
-
-@jit
-def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 2, n)`` ← what `_solve_one` finds of each of the poses T ``(N, 4, 4)``.
-
-    seeds ``(N, n)``, or ``(1, n)`` for all; lower, upper ``(n,)``: joint limits.
-    """
-    widest()
-    solved_many(_pairs, _angles, _store, _careful, _ROWS, params, T, (seeds, lower, upper), out)
+branches_one, branches_many, solve_one, solve_many = kernels_in_lanes(
+    __name__, _pairs, _angles, _store, _careful, _ROWS, _PAIRS
+)
 
 
 class Scara4(ClosedForm):
@@ -289,7 +262,7 @@ class Scara4(ClosedForm):
         g = self.geometry = geometry
         self.reason = "all axes are parallel" + ", and one joint slides" * (len(g.order) == 4)
         self.lengths = (g.a, g.b)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=_solve_many)
+        self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -317,7 +290,7 @@ class Scara4(ClosedForm):
         value = problem.values[0] if free else math.nan
         p = problem
         if p.task == POSE:
-            gap, count = _solve_one(g.params, p.T, value, p.seed, p.lower, p.upper, arcs, out)
+            gap, count = solve_one(g.params, p.T, value, p.seed, p.lower, p.upper, arcs, out)
         else:
             gap, count = _branches(g.params, p.T, (p.task, value), p.seed, p.lower, p.upper, arcs, out)
         exists = bool((~np.isnan(out[:, 0])).any())

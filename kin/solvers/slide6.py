@@ -18,10 +18,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from kin.axes import is_perpendicular, is_zero, links_of, screw_x, screw_z
-from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.compile import inlined, joined
 from kin.kernels.simd import widest
 from kin.robot import Robot
-from kin.solvers.blocks import Arc, Entries, many, one, solved, solved_many
+from kin.solvers.blocks import Arc, Entries, kernels_in_lanes
 from kin.solvers.contract import Obstacle
 from kin.solvers.names import Names, Part, eight, front_or_back, names_of
 from kin.solvers.singular import JointValue, Singularity, off_line, those_within
@@ -121,36 +121,9 @@ def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
             S[PAIRS + BEND + k, b] = sign * (-along - offset)
 
 
-@jit
-def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    return one(_pairs, _angles, store, solve, (_ROWS, PAIRS), params, T, (value, near), out)
-
-
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    widest()
-    many(_pairs, _angles, store, solve, _ROWS, params, T, (values, near), out)
-
-
-@jit
-def solve_one(
-    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `solve`, which is called where T ``(4, 4)`` is singular."""
-    request = (value, near, lower, upper, arcs)
-    return solved(_pairs, _angles, store, solve, (_ROWS, PAIRS), params, T, request, out)
-
-
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← what `solve_one` finds of each of the poses T ``(N, 4, 4)``.
-
-    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
-    """
-    widest()
-    solved_many(_pairs, _angles, store, solve, _ROWS, params, T, (seeds, lower, upper), out)
+branches_one, branches_many, solve_one, solve_many = kernels_in_lanes(
+    __name__, _pairs, _angles, store, solve, _ROWS, PAIRS
+)
 
 
 class Slide6(Wrist6):

@@ -25,7 +25,7 @@ from kin.fk import jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
-from kin.solvers.blocks import in_turn, solve_each
+from kin.solvers.blocks import each_solved, one_after_another
 from kin.solvers.common import clear
 from kin.solvers.contract import (
     APPROACH,
@@ -112,10 +112,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return if_finite(configurations, params, T, near, out)
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 2, 3)`` ← the configurations for each of the targets T ``(N, 4, 4)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)
 
 
 @jit
@@ -150,10 +147,7 @@ def _regular(
         clear(out)
 
 
-@jit
-def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 2, 3)`` ← what `_regular` finds of each target T ``(N, 4, 4)``, seeds ``(N, 3)`` or ``(1, 3)``."""
-    solve_each(_regular, math.nan, (0, 3), params, T, seeds, (lower, upper), out)
+solve_many = each_solved(_regular, math.nan, 0)
 
 
 class Slides2(SlidesForm):
@@ -166,7 +160,7 @@ class Slides2(SlidesForm):
         self.robot = robot
         order = np.concatenate([np.flatnonzero(robot.revolute), np.flatnonzero(~robot.revolute)])
         params = np.concatenate([order, [_reach(robot)], robot.model]).astype(np.float64)
-        self.kernels = BatchKernels(params, branches_one, branches_many, seeded=_solve_many)
+        self.kernels = BatchKernels(params, branches_one, branches_many, seeded=solve_many)
 
     def handles(self, task: int) -> bool:
         """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""

@@ -27,7 +27,7 @@ from kin.fk import fk, jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
-from kin.solvers.blocks import in_turn, solve_each
+from kin.solvers.blocks import each_solved, one_after_another
 from kin.solvers.common import clear
 from kin.solvers.contract import (
     POSE,
@@ -157,10 +157,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return if_finite(configurations, params, T, near, out)
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 2, 6)`` ← the configurations of each of the targets T ``(N, 4, 4)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)
 
 
 @jit
@@ -172,10 +169,7 @@ def _all(
         clear(out)
 
 
-@jit
-def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 2, 6)`` ← what `_all` finds of each pose T ``(N, 4, 4)``, seeds ``(N, 6)`` or ``(1, 6)``."""
-    solve_each(_all, math.nan, (0, 6), params, T, seeds, (lower, upper), out)
+solve_many = each_solved(_all, math.nan, 0)
 
 
 class Slides3(SlidesForm):
@@ -190,7 +184,7 @@ class Slides3(SlidesForm):
         zero = np.zeros(6)
         axes, R = jacobian(robot, zero)[3:, turns].T, fk(robot, zero)[:3, :3]
         params = np.concatenate([turns, slides, axes.ravel(), R.ravel(), robot.model]).astype(np.float64)
-        self.kernels = BatchKernels(params, branches_one, branches_many, seeded=_solve_many)
+        self.kernels = BatchKernels(params, branches_one, branches_many, seeded=solve_many)
 
     def handles(self, task: int) -> bool:
         """Poses."""

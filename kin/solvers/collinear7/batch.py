@@ -13,7 +13,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
-from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, many, one, rows_of, zyz_pairs
+from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, kernels_in_lanes, rows_of, zyz_pairs
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.collinear7.branches import SLACK, solve
 from kin.tolerances import TOLERANCES
@@ -133,29 +133,11 @@ def _robust(
 ) -> tuple[float, int]:
     """out ``(8, 7)`` ← all branches, by the kernel that also handles singular poses."""
     found, rows = np.empty((1, 3)), np.empty((8, 9))
-    no = found.shape[0] == 0  # a literal False would compile `solve` a second time
-    gap, count, _ = solve(arm, T, (value, math.nan, 0.0, no, no), near, lower, upper, found, found, rows)
+    gap, count, _ = solve(arm, T, (value, math.nan, 0.0, False, False), near, lower, upper, found, found, rows)
     for i in range(8):
         for j in range(7):
             out[i, j] = rows[i, j]
     return gap, count
 
 
-@jit
-def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
-
-    values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
-    """
-    widest()
-    many(_pairs, _angles, _store, _robust, _ROWS, arm, T, (values, near), out)
-
-
-@jit
-def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(8, 7)`` ← all branches of the target T ``(4, 4)``, NaN if there is none; False if T is not finite.
-
-    value: θ1, which is returned unchanged; NaN to move joints 1 and 2 by equal amounts from near ``(7,)``. `near`
-    also decides the angles that a singular pose leaves free.
-    """
-    return one(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (value, near), out)
+branches_one, branches_many = kernels_in_lanes(__name__, _pairs, _angles, _store, _robust, _ROWS, _PAIRS)[:2]

@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.kernels.compile import jit
-from kin.solvers.blocks import solve_each
+from kin.solvers.blocks import each_solved
 from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_box, canonical_pose
 from kin.solvers.collinear7.redundancy import at_roll, choose_roll, roll_parts, theta1_intervals
 from kin.solvers.common import (
@@ -219,10 +219,4 @@ def _pose(
     solve(arm, T, (value, math.nan, 0.0, True, False), seed, lower, upper, arcs, arcs, out)
 
 
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 7)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
-
-    seeds ``(N, 7)``, or ``(1, 7)`` for all; lower, upper ``(7,)``: joint limits.
-    """
-    solve_each(_pose, math.nan, (64, 9), params, T, seeds, (lower, upper), out)
+solve_many = each_solved(_pose, math.nan, 64, more=2)

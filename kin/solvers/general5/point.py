@@ -26,7 +26,7 @@ from kin.fk import jacobian
 from kin.kernels.compile import jit
 from kin.kernels.fk import fk_into
 from kin.robot import Robot
-from kin.solvers.blocks import in_turn
+from kin.solvers.blocks import one_after_another
 from kin.solvers.common import UNBOUNDED, clear
 from kin.solvers.contract import (
     APPROACH,
@@ -268,10 +268,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return if_finite(configurations, params, T, near, out)
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 4, 3)`` ← the configurations of each of the targets T ``(N, 4, 4)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)
 
 
 class Point3(ClosedForm):

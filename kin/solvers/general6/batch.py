@@ -9,7 +9,7 @@ import numpy as np
 from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
-from kin.solvers.blocks import in_turn
+from kin.solvers.blocks import one_after_another
 from kin.solvers.common import clear
 from kin.solvers.general6.cuts import (
     AFTER,
@@ -192,10 +192,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return solve_all(params, T, out) != NOT_FINITE
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 16, 6)`` ← all solutions of each of the targets T ``(N, 4, 4)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)
 
 
 @jit

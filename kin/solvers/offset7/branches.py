@@ -16,7 +16,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
-from kin.solvers.blocks import in_turn
+from kin.solvers.blocks import one_after_another
 from kin.solvers.canonical import canonical_pose
 from kin.solvers.common import UNBOUNDED, clear, zyz
 from kin.solvers.offset7.geometry import (
@@ -254,7 +254,4 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return True
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)

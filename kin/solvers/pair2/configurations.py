@@ -9,7 +9,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
-from kin.solvers.blocks import in_turn, solve_each
+from kin.solvers.blocks import each_solved, one_after_another
 from kin.solvers.common import clear
 from kin.solvers.contract import POSE, POSITION
 from kin.solvers.pair2.geometry import (
@@ -219,10 +219,7 @@ def _solve_pose(
     solve(params, T, POSE, near, out, np.empty((out.shape[0], 2)))
 
 
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, rows, n)`` ← what `solve` finds of each pose T ``(N, 4, 4)``, seeds ``(N, n)`` or ``(1, n)``."""
-    solve_each(_solve_pose, math.nan, (0, out.shape[2]), params, T, seeds, (lower, upper), out)
+solve_many = each_solved(_solve_pose, math.nan, 0)
 
 
 @jit
@@ -235,7 +232,4 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return True
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, rows, n)`` ← all configurations of each of the targets T ``(N, 4, 4)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)

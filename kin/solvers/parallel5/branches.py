@@ -9,7 +9,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
-from kin.solvers.blocks import in_turn, solve_each, unbounded
+from kin.solvers.blocks import each_solved, one_after_another, unbounded
 from kin.solvers.canonical import canonical_pose, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum
 from kin.solvers.contract import POSE, POSITION
@@ -167,16 +167,7 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
     return True
 
 
-@jit
-def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 4, n)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
-    in_turn(branches_one, arm, T, values, near, out)
+branches_many = one_after_another(branches_one)
 
 
-@jit
-def solve_many(arm: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 4, n)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
-
-    seeds ``(N, n)``, or ``(1, n)`` for all; lower, upper ``(n,)``: joint limits.
-    """
-    solve_each(solve, (POSE, math.nan), (0, out.shape[2] + 1), arm, T, seeds, (lower, upper), out)
+solve_many = each_solved(solve, (POSE, math.nan), 0, more=1)

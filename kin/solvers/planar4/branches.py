@@ -9,7 +9,7 @@ import numpy as np
 from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
-from kin.solvers.blocks import in_turn, unbounded
+from kin.solvers.blocks import one_after_another, unbounded
 from kin.solvers.canonical import signed_box
 from kin.solvers.common import NEAR, clear
 from kin.solvers.contract import POSE
@@ -66,7 +66,4 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     return True
 
 
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 2, 4)`` ← both branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    in_turn(branches_one, params, T, values, near, out)
+branches_many = one_after_another(branches_one)

@@ -22,8 +22,7 @@ from kin.solvers.blocks import (
     canonical_of,
     double,
     elbow_of,
-    many,
-    one,
+    kernels_in_lanes,
     rows_of,
     zyz_pairs,
 )
@@ -142,8 +141,7 @@ def _robust(
 ) -> tuple[float, int]:
     """out ``(8, 7)`` ← all branches, by the kernel that also handles singular poses."""
     found, rows = np.empty((1, 3)), np.empty((8, 8))
-    no = found.shape[0] == 0  # a literal False would compile `solve` a second time
-    _, gap, count = solve(arm, T, (value, no, no, no), near, lower, upper, found, rows)
+    _, gap, count = solve(arm, T, (value, False, False, False), near, lower, upper, found, rows)
     for i in range(8):
         for j in range(7):
             out[i, j] = rows[i, j]
@@ -173,21 +171,4 @@ def _store(arm: Array, S: Array, b: int, out: Array) -> None:
         out[row, 6] = S[_PAIRS * wrist + OWN + 6, b]
 
 
-@jit
-def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 8, 7)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
-
-    values: the arm angle of each target ``(N,)``, or one for all ``(1,)``.
-    """
-    widest()
-    many(_pairs, _angles, _store, _robust, _ROWS, arm, T, (values, near), out)
-
-
-@jit
-def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(8, 7)`` ← all branches of the target T ``(4, 4)``, NaN if there is none; False if T is not finite.
-
-    value: the arm angle, NaN for the elbow's direction at near ``(7,)``. `near` also decides the angles that a
-    singular pose leaves free.
-    """
-    return one(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (value, near), out)
+branches_one, branches_many = kernels_in_lanes(__name__, _pairs, _angles, _store, _robust, _ROWS, _PAIRS)[:2]

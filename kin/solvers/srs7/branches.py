@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.angles import excess, nearest_image, wrap
 from kin.kernels.compile import jit
-from kin.solvers.blocks import solve_each
+from kin.solvers.blocks import each_solved
 from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row
 from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, affine, angles_at, seed_arm_angle, sign_of, triangle_of
@@ -156,26 +156,4 @@ def solve(
     return FITS, 0.0, found
 
 
-@jit
-def answer(
-    arm: Array, T: Array, value: float, respect_limits: bool, free_roll: bool, joints: Array, arcs: Array,
-    out: Array, gap: Array,
-) -> int:  # fmt: skip
-    """`solve` with flat arguments, for `kin.kernels.compile.direct`.
-
-    joints ``(3, 7)``: seed, lower and upper limits. gap ``(1,)`` ← the gap in metres. Returns 256 times the code,
-    and the number of intervals added.
-    """
-    options = value, respect_limits, free_roll, False
-    code, gap[0], count = solve(arm, T, options, joints[0], joints[1], joints[2], arcs, out)
-    return 256 * code + min(count, 255)
-
-
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 7)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
-
-    NaN for some that are not the nearest to the seed. seeds ``(N, 7)``, or ``(1, 7)`` for all; lower, upper
-    ``(7,)``: joint limits.
-    """
-    solve_each(solve, (math.nan, True, False, True), (256, 8), params, T, seeds, (lower, upper), out)
+solve_many = each_solved(solve, (math.nan, True, False, True), 256, more=1)

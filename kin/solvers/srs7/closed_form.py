@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 
 from kin.axes import inverse, is_along, is_zero, links_by_rows, screw_z
-from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers.canonical import Geometry7
 from kin.solvers.contract import (
@@ -25,7 +22,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.solvers.srs7.batch import branches_many, branches_one
-from kin.solvers.srs7.branches import answer, solve_many
+from kin.solvers.srs7.branches import solve, solve_many
 from kin.solvers.srs7.geometry import TOO_FAR, TOO_NEAR, arm_angle
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -34,12 +31,6 @@ NAME = "srs7"
 TITLE = "closed form, S-R-S arm"
 _PSI = RedundancyParameter("psi", "arm angle ψ", circular=True)
 _THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
-
-
-@cache
-def _answer() -> Callable[[Array, Array, float, bool, bool, Array, Array, Array, Array], int]:
-    """`answer`, which checks its arrays."""
-    return direct(answer, 1, 2, None, None, None, 2, 2, 2, 1)
 
 
 def match(robot: Robot) -> Srs7 | None:
@@ -91,13 +82,10 @@ class Srs7(ClosedForm):
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches, each at the arm angle at which it is nearest to the seed (or at the requested one)."""
-        g, free_roll = self.geometry, problem.task == APPROACH
-        out, arcs, gaps, p = np.empty((8, 8)), np.empty((255, 3)), np.empty(1), problem
-        joints = np.array((p.seed, p.lower, p.upper))
-        found = _answer()(
-            self.kernels.params, p.T, p.values[0], p.respect_limits, free_roll, joints, arcs, out, gaps
-        )
-        code, count = divmod(found, 256)
+        g, p, free_roll = self.geometry, problem, problem.task == APPROACH
+        out, arcs = np.empty((8, 8)), np.empty((256, 3))
+        options = p.values[0], p.respect_limits, free_roll, False
+        code, gap, count = solve(self.kernels.params, p.T, options, p.seed, p.lower, p.upper, arcs, out)
         values, all_arcs = out[:, 7:], [arcs[:count]]
         if free_roll:
             # Joint 7 turns the tool about its own axis and nothing else: it stays, or takes the requested value.
@@ -111,7 +99,7 @@ class Srs7(ClosedForm):
             obstacle = Obstacle("wrist centre too far from the shoulder", g.d3 + g.d5)
         elif code == TOO_NEAR:
             obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
-        return Candidates(out[:, :7], values, tuple(all_arcs), gaps.item(0), obstacle)
+        return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
 
     def value_at(self, T: Array, q: Array) -> float:
         """The arm angle of a configuration."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.compile import inlined, joined
 from kin.kernels.simd import widest
 from kin.solvers.blocks import (
     NEARLY,
@@ -17,12 +17,9 @@ from kin.solvers.blocks import (
     double,
     elbow_of,
     in_base,
-    many,
-    one,
+    kernels_in_lanes,
     rows_of,
     single,
-    solved,
-    solved_many,
 )
 from kin.solvers.wrist5.branches import solve
 from kin.solvers.wrist5.geometry import A1, A2, BASE, D4, D6, OFFSET
@@ -118,40 +115,6 @@ def _store(arm: Array, S: Array, b: int, out: Array) -> None:
         out[row, 4] = S[_PAIRS * flip + _TILT + upper, b]
 
 
-@jit
-def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(8, 5)`` ← all branches of the target T ``(4, 4)``, NaN where there is none; False if T is not finite.
-
-    value: θ1 where the wrist centre is on axis 1, NaN for that of near ``(5,)``. `near` also decides θ4 where
-    sin θ5 vanishes.
-    """
-    return one(_pairs, _angles, _store, solve, (_ROWS, _PAIRS), arm, T, (value, near), out)
-
-
-@jit
-def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 8, 5)`` ← all branches of each of the targets T ``(N, 4, 4)``; see `branches_one`.
-
-    values: θ1 for each target ``(N,)``, or one for all ``(1,)``.
-    """
-    widest()
-    many(_pairs, _angles, _store, solve, _ROWS, arm, T, (values, near), out)
-
-
-@jit
-def solve_one(
-    arm: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `solve`, which is called where T ``(4, 4)`` is singular; elsewhere the number of intervals is −1."""
-    request = (value, near, lower, upper, arcs)
-    return solved(_pairs, _angles, _store, solve, (_ROWS, _PAIRS), arm, T, request, out)
-
-
-@jit
-def solve_many(arm: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 5)`` ← what `solve_one` finds of each of the targets T ``(N, 4, 4)``.
-
-    seeds ``(N, 5)``, or ``(1, 5)`` for all; lower, upper ``(5,)``: joint limits.
-    """
-    widest()
-    solved_many(_pairs, _angles, _store, solve, _ROWS, arm, T, (seeds, lower, upper), out)
+branches_one, branches_many, solve_one, solve_many = kernels_in_lanes(
+    __name__, _pairs, _angles, _store, solve, _ROWS, _PAIRS
+)

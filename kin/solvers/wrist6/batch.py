@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.compile import inlined, joined
 from kin.kernels.simd import widest
 from kin.solvers.blocks import (
     NEARLY,
@@ -18,13 +18,10 @@ from kin.solvers.blocks import (
     canonical_of,
     double,
     elbow_of,
-    many,
-    one,
+    kernels_in_lanes,
     rows_of,
     shoulder_of,
     single,
-    solved,
-    solved_many,
     zyz_pairs,
 )
 from kin.solvers.wrist6.branches import Rotation, solve
@@ -174,33 +171,6 @@ def store(params: Array, S: Array, b: int, out: Array) -> None:
         out[row, 5] = S[PAIRS * flip + _SPIN + arm, b]
 
 
-@jit
-def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(8, 6)`` ← all branches of the target T ``(4, 4)``; False if T is not finite."""
-    return one(_pairs, _angles, store, solve, (ROWS, PAIRS), params, T, (value, near), out)
-
-
-@jit
-def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
-    widest()
-    many(_pairs, _angles, store, solve, ROWS, params, T, (values, near), out)
-
-
-@jit
-def solve_one(
-    params: Array, T: Array, value: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
-    """As `solve`, which is called where T ``(4, 4)`` is singular."""
-    request = (value, near, lower, upper, arcs)
-    return solved(_pairs, _angles, store, solve, (ROWS, PAIRS), params, T, request, out)
-
-
-@jit
-def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-    """out ``(N, 8, 6)`` ← what `solve_one` finds of each of the poses T ``(N, 4, 4)``.
-
-    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
-    """
-    widest()
-    solved_many(_pairs, _angles, store, solve, ROWS, params, T, (seeds, lower, upper), out)
+branches_one, branches_many, solve_one, solve_many = kernels_in_lanes(
+    __name__, _pairs, _angles, store, solve, ROWS, PAIRS
+)

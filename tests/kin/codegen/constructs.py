@@ -596,11 +596,21 @@ def library(x, y, a):
     return math.sqrt(abs(x)) + math.floor(-x) + math.ceil(y) + math.fabs(x) + math.pi
 
 
+def _scaled_by(scale):
+    def scaled(x, y, a):
+        return scale * x + y
+
+    return scaled
+
+
+scaled = _scaled_by(2.5)  # a number around the function
+
 RIGHT = (
     negative_index, floor_large, zero_of_whole_numbers, shift, powers, quotients, least_and_most, rounded, both_conditions,
     loop_variable, range_that_changes, slices, conditions, chosen, truth_in_sums, tables, signs_and_brackets,
     bits_of_words, complex_numbers, arrays_of_all_kinds, swapped, arrays_swapped, chained, named_tuple,
     returned_array, passed_kernel, whole_arrays, nested_calls, library, writers_in_order, arrays_of_calls,
+    scaled,
 )  # fmt: skip
 
 
