@@ -112,25 +112,19 @@
     send(["row", action, here], null, action === "add" ? () => answeredRow(row) : null);
     here += { add: 1, up: -1, down: 1 }[action] ?? 0;
     focus = focus?.replace(/^(\[data-cell=")\d+/, `$1${here}`) ?? null;
-    moves = true;
+    moves = focus !== null;
   }
 
   // Focus: it follows a row that moves
 
-  let focus = null; // a selector of the field or button that has it
+  let focus = null; // a selector of the field that has it
   let moves = false; // its row moves
-  let gone = false; // the visitor has left it
   let left = 0;
   addEventListener("focusin", (event) => {
     const row = event.target.closest?.("[data-arm] tr[data-row]");
     if (row) { here = Number(row.dataset.row); mark(); }
     const cell = event.target.closest?.("[data-arm] [data-cell]");
-    const button = event.target.closest?.("[data-arm] [data-arm-do]");
-    const argument = button?.dataset.argument === undefined ? "" : `[data-argument="${button.dataset.argument}"]`;
-    const name = cell ? `[data-cell="${cell.dataset.cell}"]`
-      : button ? `[data-arm-do="${button.dataset.armDo}"]${argument}` : null;
-    gone = false;
-    if (button && name === focus) return; // `restore` gave it back: that is no field that was left
+    const name = cell ? `[data-cell="${cell.dataset.cell}"]` : null;
     clearTimeout(left);
     if (cell?.matches("input") && name !== focus) cell.select();
     if (focus && name !== focus) { flush(); channel.send("released"); }
@@ -139,20 +133,18 @@
   });
   addEventListener("focusout", (event) => {
     const target = event.target;
-    if (event.relatedTarget || !target.closest?.("[data-arm]")) return;
+    if (event.relatedTarget || !target.closest?.("[data-arm] [data-cell]")) return;
     // Browsers also report an element that they are about to remove; after that it is not connected.
-    queueMicrotask(() => { if (target.isConnected && document.activeElement === document.body) gone = true; });
-    if (target.isConnected && target.closest("[data-cell]")) left = setTimeout(leave, LEFT);
+    queueMicrotask(() => { if (target.isConnected && document.activeElement === document.body) focus = null; });
+    if (target.isConnected) left = setTimeout(leave, LEFT);
   });
   function leave() {
     if (document.activeElement?.closest("[data-arm] [data-cell]")) return;
-    if (document.activeElement === document.body) focus = null;
     flush();
     send(["left"], null);
   }
   function restore() {
-    if (!focus || gone || !(moves || document.activeElement === document.body)) return;
-    const cell = document.querySelector(`[data-arm] ${focus}`);
+    const cell = focus && moves ? document.querySelector(`[data-arm] ${focus}`) : null;
     if (!cell) return;
     moves = false;
     cell.focus({ preventScroll: true });
