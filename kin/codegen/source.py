@@ -21,13 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, SINGLE, WORD, Constants, Scalar, TupleOf, Type
+from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, SINGLE, WORD, Constants, Scalar, TupleOf, Type
 from kin.kernels import simd
-from kin.kernels.compile import inlined, joined
+from kin.kernels.compile import inlined
 from kin.kernels.plain import names_around
 
 MISSING = object()
-_INLINED = {inlined.__name__, joined.__name__}
 
 
 class OutsideSubsetError(Exception):
@@ -56,7 +55,6 @@ PRIMITIVES: Mapping[Any, tuple[str, tuple[Scalar, ...], Type]] = {
     math.ceil: ("ceil_whole", (FLOAT,), INT),
     np.round: ("rint", (FLOAT,), FLOAT),
     np.rint: ("rint", (FLOAT,), FLOAT),
-    plain(simd.widest): ("widest", (), NONE),
     # Their polynomials read the bits of a float, which JavaScript cannot: it has its own functions.
     plain(simd.sin_cos): ("sin_cos", (FLOAT,), TupleOf((FLOAT, FLOAT))),
     plain(simd.atan2): ("arctan2", (FLOAT, FLOAT), FLOAT),
@@ -89,7 +87,7 @@ def decorators(function: FunctionType) -> set[str]:
 
 def is_inlined(function: FunctionType) -> bool:
     """Whether a kernel is compiled into its callers, so that their loops are vectorised."""
-    return bool(decorators(function) & _INLINED)
+    return inlined.__name__ in decorators(function)
 
 
 class Scope:

@@ -73,11 +73,6 @@ def inlined(function: _Kernel) -> _Kernel:
     return jit(function)
 
 
-def joined(function: _Kernel) -> _Kernel:
-    """As `inlined`, for a kernel with kernels as arguments."""
-    return jit(function)
-
-
 def direct(kernel: Any, *arrays: int | tuple[int | None, ...] | None) -> Callable[..., Any]:
     """A kernel as a function that is called without a detour.
 

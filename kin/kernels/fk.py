@@ -29,7 +29,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import brief, inlined, jit
-from kin.kernels.simd import WIDE, sin_cos, widest
+from kin.kernels.simd import WIDE, sin_cos
 from kin.transforms import Array
 
 BLOCK = 64
@@ -226,7 +226,6 @@ def fk_one(model: Array, q: Array, T: Array) -> bool:
 def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Array) -> int:
     """S ← sin θ, cos θ, d of row i for a block of configurations; returns how many values are not finite."""
     theta, d, j, turn, slide = z_row(model, i)
-    widest()
     wide = 0
     bad = 0
     if turn != 0.0:
@@ -257,7 +256,6 @@ def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Arra
 @jit
 def fk_many(model: Array, q: Array, out: Array) -> bool:
     """out ← T_base_tool ``(k, 4, 4)`` of configurations ``(k, n)``; False if any of them is not finite."""
-    widest()
     S = np.empty(_SPACE)
     T = np.empty((4, 4))
     ahead = load_base(model, T)
@@ -300,7 +298,6 @@ def positions_many(model: Array, q: Array, out: Array) -> bool:
 
     It works backwards from the tool: each row then moves one point instead of a frame.
     """
-    widest()
     X, Y, Z = _T0, _T1, _T2
     S = np.empty(_SPACE)
     T = np.empty((4, 4))

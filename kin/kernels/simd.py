@@ -56,10 +56,6 @@ def fma(a: float, b: float, c: float) -> float:
         return c if math.isfinite(a) and math.isfinite(b) and not math.isfinite(c) else a * b + c
 
 
-def widest() -> None:
-    """Called in a kernel, allows its loops the widest vectors of the processor."""
-
-
 def bits_of(x: float) -> int:
     """The 64 bits of a float as an integer."""
     return int(struct.unpack("<q", struct.pack("<d", x))[0])

@@ -23,9 +23,9 @@ from typing import TypeVar
 import numpy as np
 
 from kin.angles import TURN
-from kin.kernels.compile import inlined, jit, joined
+from kin.kernels.compile import inlined, jit
 from kin.kernels.fk import BLOCK, all_finite_pose
-from kin.kernels.simd import atan2, rounded, widest, wrapped
+from kin.kernels.simd import atan2, rounded, wrapped
 from kin.solvers.common import UNBOUNDED, clear
 from kin.solvers.contract import Many, One, Seeded
 from kin.tolerances import TOLERANCES
@@ -53,7 +53,7 @@ Entries = tuple[float, float, float, float, float, float, float, float, float, f
 Vector = tuple[float, float, float]
 
 
-@joined
+@inlined
 def each(
     pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, bool], params: Array,
     T: Array, request: tuple[Array, Array, Array, Array], out: Array,
@@ -89,7 +89,7 @@ def each(
                         clear(out[i])
 
 
-@joined
+@inlined
 def regular(
     pairs: Pairs, angles: Angles, store: Store, layout: tuple[int, int], params: Array, T: Array,
     request: tuple[float, Array], out: Array,
@@ -136,7 +136,6 @@ def kernels_in_lanes(
         return all_finite_pose(T)
 
     def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-        widest()
         limits = unbounded(near.shape[0])
         around = (values, near.reshape(1, near.shape[0]), limits[0], limits[1])
         each(pairs, angles, store, careful, (rows, True), params, T, around, out)
@@ -155,7 +154,6 @@ def kernels_in_lanes(
         return careful(params, T, value, near, lower, upper, arcs, out)
 
     def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
-        widest()
         request = (np.full(1, math.nan), seeds, lower, upper)
         each(pairs, angles, store, careful, (rows, False), params, T, request, out)
 
@@ -315,25 +313,23 @@ def _shift(sign: float, offset: float) -> float:
     return angle - TURN * rounded(angle / TURN)
 
 
-@joined
+@inlined
 def single(
     angle_of: Arc, S: Array, first: int, last: int, pairs: int, count: int, sign: float, offset: float
 ) -> None:
     """S[first:last] ← joint values of the angles whose pairs (y, x) are S[k], S[pairs + k]."""
-    widest()
     shift = _shift(sign, offset)
     for k in range(first, last):
         for b in range(count):
             S[k, b] = wrapped(sign * angle_of(S, k, pairs, b) + shift)
 
 
-@joined
+@inlined
 def double(
     angle_of: Arc, S: Array, first: int, last: int, pairs: int, count: int, sign: float, offset: float,
     turned: bool,
 ) -> None:  # fmt: skip
     """As `single`, and S[pairs + k] ← those of the same angles half a turn on, or of the opposite sign."""
-    widest()
     shift = _shift(sign, offset)
     second, other = (sign, wrapped(shift + math.pi)) if turned else (-sign, shift)
     for k in range(first, last):

@@ -22,8 +22,8 @@ import numpy as np
 
 from kin.angles import wrap
 from kin.axes import frame_of, is_along, is_zero, lines_of, perpendicular_to
-from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.simd import widest, wrapped
+from kin.kernels.compile import inlined, jit
+from kin.kernels.simd import wrapped
 from kin.robot import Robot
 from kin.solvers.blocks import OWN, Arc, double, elbow_of, in_base, kernels_in_lanes, rows_of, single
 from kin.solvers.canonical import pose_params, signed_box
@@ -213,10 +213,9 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
     return found
 
 
-@joined
+@inlined
 def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
-    widest()
     s1, s2, s3 = params[_SIGN], params[_SIGN + 1], params[_SIGN + 2]
     o1, o2, o3 = params[_OFFSET], params[_OFFSET + 1], params[_OFFSET + 2]
     double(arc, S, _BEND, _SUM, _PAIRS, count, s2, o2, False)

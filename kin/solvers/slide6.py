@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from kin.axes import is_perpendicular, is_zero, links_of, screw_x, screw_z
-from kin.kernels.compile import inlined, joined
-from kin.kernels.simd import widest
+from kin.kernels.compile import inlined
 from kin.robot import Robot
 from kin.solvers.blocks import Arc, Entries, kernels_in_lanes
 from kin.solvers.contract import Obstacle
@@ -108,10 +107,9 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
     return both_sides(_side, params, count, S)
 
 
-@joined
+@inlined
 def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
-    widest()
     all_but_third(arc, params, count, S)
     sign, offset = params[SIGN + 2], params[OFFSET + 2]
     for k in range(2):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from kin.kernels.compile import jit, joined
+from kin.kernels.compile import inlined, jit
 from kin.kernels.fk import all_finite_pose
 from kin.robot import Robot
 from kin.solvers.common import clear
@@ -33,7 +33,7 @@ def triple(a: Array, b: Array, c: Array) -> float:
     )
 
 
-@joined
+@inlined
 def if_finite(
     configurations: Callable[[Array, Array, Array, Array], object], params: Array, T: Array, near: Array,
     out: Array,

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from kin.angles import wrap
-from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.simd import widest, wrapped
+from kin.kernels.compile import inlined, jit
+from kin.kernels.simd import wrapped
 from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, kernels_in_lanes, rows_of, zyz_pairs
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
 from kin.solvers.collinear7.branches import SLACK, solve
@@ -84,13 +84,12 @@ def _pairs(arm: Array, near: Array, count: int, S: Array) -> int:
     return found
 
 
-@joined
+@inlined
 def _angles(arc: Arc, arm: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs.
 
     Without a requested θ1, joints 1 and 2 move by equal amounts from near ``(7,)``.
     """
-    widest()
     for joint in range(1, 7):
         # The second solution: half a turn on for θ3, θ5, θ7, the other sign for θ4, θ6; θ12 has none.
         offset = arm[OFFSET + joint] if joint > 1 else 0.0

@@ -18,7 +18,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from kin.kernels.compile import jit, joined
+from kin.kernels.compile import inlined, jit
 from kin.solvers.contract import POSITION
 from kin.solvers.numeric.error import Goal, look, quadratic_model
 from kin.solvers.numeric.step import solve_free
@@ -87,7 +87,7 @@ def _foot(J: Array, e: Array, q: Array, aim: Array, scale: Array, low: Array, hi
             multipliers[r] += move[r]
 
 
-@joined
+@inlined
 def back_onto(
     linear: Linear[_Task], task: _Task, bounds: tuple[Array, Array], scale: Array,
     work: tuple[Array, Array, Array], q: Array,
@@ -109,7 +109,7 @@ def back_onto(
     return error
 
 
-@joined
+@inlined
 def move_towards(
     linear: Linear[_Task], task: _Task, rows: int, near: tuple[Array, Array], bounds: tuple[Array, Array],
     scale: Array, q: Array,

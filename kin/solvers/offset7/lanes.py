@@ -14,7 +14,7 @@ import numpy as np
 
 from kin.angles import TURN, wrap
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import atan2, sin_cos, widest
+from kin.kernels.simd import atan2, sin_cos
 from kin.solvers.blocks import Entries, rows_of
 from kin.solvers.canonical import canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR
@@ -190,7 +190,6 @@ def _read(setup: Array) -> tuple[Entries, Entries, Entries, Entries, Entries]:
 @jit
 def lanes(params: Array, T: Array, box: Array, setup: Array, L: Array, count: int) -> None:
     """Columns FIRST to ANGLES of `count` lanes L ``(≥ SPACE,)`` ← from their values, elbows and sides (±1.0)."""
-    widest()
     n, p, d, m, h = _read(setup)
     padded = count + (-count) % _WIDE
     for b in range(count, padded):
@@ -245,7 +244,6 @@ def level_at(setup: Array, value: float, elbow: float) -> float:
 @jit
 def rooms(setup: Array, values: Array, elbow: float, room: Array, levels: Array) -> None:
     """room, levels ``(n,)`` ← `room_at` and `level_at` each of the values ``(n,)``."""
-    widest()
     n, p, d, m, h = _read(setup)
     for i in range(values.shape[0]):
         bent, level, _, _ = _lane(values[i], elbow, 1.0, n, p, d, m, h)

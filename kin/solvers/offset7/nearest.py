@@ -15,7 +15,7 @@ import numpy as np
 
 from kin.angles import TURN
 from kin.kernels.compile import jit
-from kin.kernels.simd import rounded, widest, wrapped
+from kin.kernels.simd import rounded, wrapped
 from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.offset7.lanes import ANGLES, ELBOW, STRIDE, VALUE, lanes
 from kin.solvers.offset7.lanes import SIDE as LANE_SIDE
@@ -64,7 +64,6 @@ def _evaluate(target: Target, seed: tuple[float, float], middle: Array, count: i
 
     If L has rows for the steps of the joints, these too.
     """
-    widest()
     params, T, box, setup = target
     value, weight = seed
     for b in range(count):

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import rounded, widest
+from kin.kernels.simd import rounded
 from kin.solvers.offset7.lanes import ELBOW, FIRST, ROOM, SECOND, SETUP, SIDE, SPACE, VALUE, lanes, set_up
 from kin.solvers.offset7.nearest import nearest_values
 from kin.solvers.offset7.places import marks_of, places_of
@@ -135,7 +135,6 @@ def _ends_of(
 @jit
 def _where_to_look(room: Array, f: Array, sense: Array, crosses: Array) -> None:
     """crosses ``(n,)`` ← 1.0 if f has a zero behind a sample; sense ``(n,)`` ← 0.0 if a branch ends beside it."""
-    widest()
     n = f.shape[0]
     for i in range(n - 1):
         crosses[i] = 1.0 if (f[i] >= 0.0) != (f[i + 1] >= 0.0) else 0.0
@@ -189,7 +188,6 @@ def _narrow(target: Target, ends: Array, count: int, L: Array, Z: Array) -> None
 @jit
 def _next_values(Z: Array, n: int, L: Array) -> None:
     """Lanes 0 to n − 1 of L ← where to look for the zeros in the brackets of Z."""
-    widest()
     for i in range(n):
         k = Z[_BRANCH, i]
         upper = k - 4.0 if k >= 4.0 else k
@@ -200,7 +198,6 @@ def _next_values(Z: Array, n: int, L: Array) -> None:
 @jit
 def _take(L: Array, n: int, Z: Array) -> None:
     """The brackets of Z, narrowed by what `lanes` found."""
-    widest()
     for i in range(n):
         k = Z[_BRANCH, i]
         half = 0.5 * k

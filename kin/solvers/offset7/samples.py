@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import widest, wrapped
+from kin.kernels.simd import wrapped
 from kin.solvers.blocks import Entries
 from kin.solvers.offset7.lanes import (
     ANGLES,
@@ -149,7 +149,6 @@ def _around(D: Array, j: int, i: int) -> float:
 def _doubts(setup: Array, W: Array, n: int, D: Array) -> None:
     """D[_DOUBT + i] ← the larger `_doubt` of both branches between entries i and i + 1, D[_MOST_DOUBT + i] ← the
     largest one from three intervals before entry i to three after it."""
-    widest()
     h = limits_of(setup)
     for j in range(JOINTS):
         a, d = ANGLES + j * STRIDE, j * STRIDE

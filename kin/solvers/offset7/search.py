@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import widest
 from kin.solvers.offset7.lanes import level_at, room_at, slack_at
 from kin.transforms import Array
 
@@ -96,7 +95,6 @@ def turns(x: Array, f: Array, out: Array) -> None:
 
     It could if the steeper of the two slopes, over the wider interval, leads as far as zero.
     """
-    widest()
     n = out.shape[0]
     out[0] = out[n - 1] = 0.0
     for i in range(1, n - 1):

@@ -6,8 +6,8 @@ eight branches θ2. The other elbow is −θ3, the other wrist −θ5 and half a
 
 from __future__ import annotations
 
-from kin.kernels.compile import inlined, joined
-from kin.kernels.simd import widest, wrapped
+from kin.kernels.compile import inlined
+from kin.kernels.simd import wrapped
 from kin.solvers.blocks import (
     NEARLY,
     OWN,
@@ -114,10 +114,9 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
     return found
 
 
-@joined
+@inlined
 def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
-    widest()
     single(arc, S, _FRONT, _SUM, _PAIRS, count, params[SIGN], params[OFFSET])
     double(arc, S, _TILT, _SPIN, _PAIRS, count, params[SIGN + 4], params[OFFSET + 4], False)
     double(arc, S, _SPIN, _BEND, _PAIRS, count, params[SIGN + 5], params[OFFSET + 5], True)

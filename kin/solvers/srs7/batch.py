@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from kin.angles import wrap
-from kin.kernels.compile import inlined, jit, joined
-from kin.kernels.simd import WIDE, sin_cos, widest
+from kin.kernels.compile import inlined, jit
+from kin.kernels.simd import WIDE, sin_cos
 from kin.solvers.blocks import (
     OWN,
     VALUE,
@@ -148,10 +148,9 @@ def _robust(
     return gap, count
 
 
-@joined
+@inlined
 def _angles(arc: Arc, arm: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
-    widest()
     for k in range(_PAIRS):
         # The second solution: half a turn on for even k (θ1, θ3, θ5, θ7), the other sign for odd k.
         double(arc, S, OWN + k, OWN + k + 1, _PAIRS, count, 1.0, arm[OFFSET + k], k % 2 == 0)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 from kin.kernels.compile import jit
-from kin.kernels.simd import widest
 from kin.transforms import Array
 
 # Rows of L: the parameter and the bracket around it, the ends of its interval (infinite once they have been tried
@@ -57,7 +56,6 @@ def whole_vectors(count: int, L: Array) -> int:
 @jit
 def step(count: int, first: bool, L: Array) -> float:
     """One step of `count` lanes from what was evaluated; returns the longest one."""
-    widest()
     for b in range(count):
         x, g = L[AT, b], L[G, b]
         better = L[F, b] < L[LEAST, b]

@@ -12,7 +12,7 @@ import math
 
 from kin.angles import TURN, wrap
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import atan2, sin_cos, widest
+from kin.kernels.simd import atan2, sin_cos
 from kin.solvers.common import HIGH, LOW, NEAR
 from kin.solvers.srs7.minima import (
     AT,
@@ -94,7 +94,6 @@ def _entries(parts: Array, joint: int) -> Entries:
 @jit
 def _evaluate(parts: Array, box: Array, moving: int, count: int, L: Array) -> None:
     """Rows F, G and RATE of `count` lanes ← at their arm angles; moving: angles of the wrist that count."""
-    widest()
     for joint in range(2):
         m, i = _entries(parts, joint), 4 * joint
         last, more = 1.0 if joint == 0 or moving == 3 else 0.0, 1.0 if joint > 0 else 0.0
@@ -121,7 +120,6 @@ def add_best(
     grid: the first column of W that belongs to the grid. span: which rows of arcs are the branch's intervals, none
     without limits. psi: an arm angle inside the limits.
     """
-    widest()
     f = W[FIRST]
     _weigh_all(branch, grid + GRID, W, f)
     least, at = math.inf, -1
@@ -152,7 +150,6 @@ def add_others(
     nor a middle, and the first one of the grid, where the derivative is needed too: its signs tell minima between
     two arm angles.
     """
-    widest()
     W, L, D = work
     parts, box, moving = joints
     f, picked, cell = W[FIRST], W[FIRST + 1], W[CELL]

@@ -15,7 +15,7 @@ import numpy as np
 
 from kin.angles import TURN
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import atan2, rounded, sin_cos, widest, wrapped
+from kin.kernels.simd import atan2, rounded, sin_cos, wrapped
 from kin.solvers.common import (
     HIGH,
     LOW,
@@ -117,7 +117,6 @@ def _roots(rows: Array) -> None:
 
     Does the same as `kin.solvers.common.add_roots`, to all at once, as vectors.
     """
-    widest()
     for k in range(_CONDITIONS):
         a, b, c = rows[0, k], rows[1, k], rows[2, k]
         amplitude = math.sqrt(a * a + b * b)
@@ -167,7 +166,6 @@ def _split(parts: Array, joint: int, count: int, box: Array, W: Array) -> int:
 
     Returns for how many of these sin B vanishes.
     """
-    widest()
     M0, M1, M2 = parts[joint, 0], parts[joint, 1], parts[joint, 2]
     singular = 0
     for j in range(count):
@@ -215,7 +213,6 @@ def weigh(parts: Array, joint: int, moving: int, count: int, box: Array, W: Arra
     other sign is A + π, −B, C + π. Every operation is applied to all arm angles at once, as vectors. Returns at
     how many of them sin B vanishes.
     """
-    widest()
     singular = _split(parts, joint, count, box, W)
     misfit, step = SHOULDER_MISFIT + 2 * joint, SHOULDER_STEP + 2 * joint
     for side in range(2):

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-from kin.kernels.compile import inlined, joined
-from kin.kernels.simd import widest
+from kin.kernels.compile import inlined
 from kin.solvers.blocks import (
     NEARLY,
     OWN,
@@ -87,10 +86,9 @@ def _pairs(arm: Array, near: Array, count: int, S: Array) -> int:
     return found
 
 
-@joined
+@inlined
 def _angles(arc: Arc, arm: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
-    widest()
     double(arc, S, _FRONT, _BEND, _PAIRS, count, 1.0, arm[OFFSET], True)
     double(arc, S, _BEND, _UPPER, _PAIRS, count, 1.0, arm[OFFSET + 2], False)
     single(arc, S, _UPPER, _ROLL, _PAIRS, count, 1.0, arm[OFFSET + 1])

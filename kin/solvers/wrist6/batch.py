@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from kin.kernels.compile import inlined, joined
-from kin.kernels.simd import widest
+from kin.kernels.compile import inlined
 from kin.solvers.blocks import (
     NEARLY,
     OWN,
@@ -112,7 +111,7 @@ def _side(
     return close0 | close1 | close2
 
 
-@joined
+@inlined
 def both_sides(side: Side, params: Array, count: int, S: Array) -> int:
     """The pairs of `count` targets with W before axis 1 and behind it, each written by `side`.
 
@@ -140,7 +139,7 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
     return both_sides(_side, params, count, S)
 
 
-@joined
+@inlined
 def all_but_third(arc: Arc, params: Array, count: int, S: Array) -> None:
     """S ← the values of joints 1, 2, 4, 5, 6 for `count` targets, from the pairs."""
     single(arc, S, FRONT, BEND, PAIRS, count, params[SIGN], params[OFFSET])
@@ -150,10 +149,9 @@ def all_but_third(arc: Arc, params: Array, count: int, S: Array) -> None:
     double(arc, S, _SPIN, _END, PAIRS, count, params[SIGN + 5], params[OFFSET + 5], True)
 
 
-@joined
+@inlined
 def _angles(arc: Arc, params: Array, near: Array, count: int, S: Array) -> None:
     """S ← the joint values of `count` targets, from the pairs."""
-    widest()
     all_but_third(arc, params, count, S)
     double(arc, S, BEND, _UPPER, PAIRS, count, params[SIGN + 2], params[OFFSET + 2], False)
 

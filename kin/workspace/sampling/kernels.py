@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
 from kin.kernels.fk import BLOCK, load_base, sine_cosine, x_part, z_row
-from kin.kernels.simd import fma, sin_cos_quarters, widest
+from kin.kernels.simd import fma, sin_cos_quarters
 from kin.transforms import Array
 from kin.workspace.region import BoundedArm
 from kin.workspace.sampling.streams import Streams, Words, fraction, scrambled
@@ -78,7 +78,6 @@ def _store(S: Array, T: Array, P: Points, out: Points, first: int) -> None:
 @jit
 def sample_points(arm: BoundedArm, streams: Streams, start: int, out: Points) -> None:
     """out ← tool points ``(k, 3)`` of samples start, start + 1, …."""
-    widest()
     model, low, high = arm.model, arm.lower, arm.upper
     key, step, quasi = streams.key, streams.step, streams.quasi
     S = np.empty(_SPACE)
@@ -121,7 +120,6 @@ def sample_points(arm: BoundedArm, streams: Streams, start: int, out: Points) ->
 @jit
 def sample_configurations(arm: BoundedArm, streams: Streams, start: int, out: Array) -> None:
     """out ← the configurations ``(k, n)`` of samples start, start + 1, …"""
-    widest()
     low, high = arm.lower, arm.upper
     for j in range(out.shape[1]):
         span = high[j] - low[j]
