@@ -18,6 +18,7 @@ import pytest
 import kin
 from kin import InputError
 from kin.kernels import fk as fk_kernels
+from kin.kernels.ahead import levels
 from kin.kernels.compile import direct, fits
 
 ROBOT = kin.get_robot("pioneer5")
@@ -148,13 +149,13 @@ def test_functions_that_are_not_compiled_answer_the_same(answers):
         text=True,
         check=True,
     )
-    plain = json.loads(done.stdout)
+    plain, off = json.loads(done.stdout), 1e-12 if next(levels()) == "x86_64_v2" else 0.0  # that has no fma
     assert plain.keys() == {name for name in answers if name.startswith(names)}
     for name, answer in plain.items():
         if isinstance(answer, str):
             assert answer == answers[name], name
         else:
-            assert np.array(answer) == pytest.approx(np.array(answers[name]), abs=1e-12), name
+            assert np.allclose(answer, answers[name], rtol=0.0, atol=off, equal_nan=True), name
 
 
 @pytest.mark.full
