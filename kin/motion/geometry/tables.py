@@ -102,7 +102,8 @@ def pose_into(numbers: Numbers, index: int, s: float, T: Array) -> None:
         return
     radius = row[_RADIUS]
     first, second = corner_at(s / row[1], radius)
-    before, after = int(row[_A]), int(row[_B])
+    rows = numbers[0].shape[0]
+    before, after = int(row[_A]) % rows, int(row[_B]) % rows
     T0, T1, met, turned = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4)), np.empty((3, 3))
     _plain(numbers, before, numbers[0][before, 1] + first, T0)
     _plain(numbers, after, second, T1)
@@ -137,7 +138,7 @@ def _plain(numbers: Numbers, index: int, s: float, T: Array) -> None:
     row = numbers[0][index]
     T[3, 0] = T[3, 1] = T[3, 2] = 0.0
     T[3, 3] = 1.0
-    if row[0] == THROUGH:
+    if row[0] == THROUGH and numbers[1].shape[0] > 0:
         _through(numbers, row, s, T)
         return
     f = s / row[1]
@@ -179,7 +180,8 @@ def _turned(row: Array, at: int, f: float, x: float, y: float, z: float) -> tupl
 def _through(numbers: Numbers, row: Array, s: float, T: Array) -> None:
     """T ← the pose of a spline of point and quaternion."""
     knots, pieces = numbers[1], numbers[2]
-    i, last = int(row[_A]), int(row[_A]) + int(row[_B]) - 1
+    i = min(max(int(row[_A]), 0), knots.shape[0] - 1)
+    last = min(i + int(row[_B]), knots.shape[0]) - 1
     while i < last and s >= knots[i + 1]:
         i += 1
     d, p = s - knots[i], pieces[i]

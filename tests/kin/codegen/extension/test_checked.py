@@ -12,9 +12,14 @@ import small
 
 from kin.codegen.extension import build, wrappers
 from kin.codegen.extension.wanted import DEMAND
+from kin.codegen.source import plain
 from kin.codegen.types import FLOAT, INT, ArrayOf
 from kin.codegen.units import Entry, entry_of, units
+from kin.ik import candidates
 from kin.kernels import ahead
+from kin.motion.geometry import splines, tables
+from kin.solvers.general6 import batch
+from kin.workspace.search import cells
 
 F1, F2 = ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2)
 
@@ -139,3 +144,30 @@ def test_each_array_has_a_length_for_each_axis():
 def _flat(kinds):
     for kind in kinds:
         yield from _flat(kind.items) if hasattr(kind, "items") else (kind,)
+
+
+CORNERS, SPLINES = np.zeros((1, 30)), np.zeros((1, 30))
+CORNERS[0, :4], SPLINES[0, :4] = (tables.CORNER, 1.0, 7.0, -7.0), (tables.THROUGH, 1.0, 7.0, 9.0)
+FAR = [
+    (splines._part, (np.arange(3.0), np.zeros((2, 1, 4)), np.array([5, 5]), np.zeros(4), np.zeros((3, 1, 4)))),
+    (batch.loop_of, (np.full(117, 9.0), np.eye(4), np.zeros((6, 3, 4)))),
+    (
+        cells._first_in_each,
+        (np.full((1, 3), -5.0), cells._Grid(np.zeros(3), np.ones(3), (2, 2, 2)), np.zeros((2, 2, 2, 1), int)),
+    ),
+    (
+        candidates.ranges,
+        (np.array([[0, 0, 1], [0, 2, 3]]), np.array([0, 0]), np.array([True]), False, np.empty((3, 3))),
+    ),
+    *(
+        (tables.poses_into, ((rows, *spline), np.zeros(1, int), *np.zeros((3, 1)), np.zeros((1, 4, 4))))
+        for rows in (CORNERS, SPLINES)
+        for spline in ((np.zeros(0), np.zeros((0, 7, 4))), (np.zeros(2), np.ones((2, 7, 4))))
+    ),
+]
+
+
+@pytest.mark.parametrize(("kernel", "arguments"), FAR)
+def test_what_a_kernel_finds_in_an_array_is_no_index_outside(kernel, arguments):
+    """Where entries cannot say which values there are: as Python runs it, an index outside is an error."""
+    plain(kernel)(*arguments)
