@@ -64,7 +64,8 @@ def named_in_python(module: ModuleType) -> set[object]:
 
     for node in ast.parse(inspect.getsource(module)).body:
         own = known.get(node.name) if isinstance(node, ast.FunctionDef) else None
-        if getattr(own, "__module__", "") != module.__name__:  # not a kernel
+        makes = isinstance(node, ast.FunctionDef) and node.name in MAKERS
+        if getattr(own, "__module__", "") != module.__name__ and not makes:  # not a kernel
             visit(node)
     return found
 
