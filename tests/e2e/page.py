@@ -204,6 +204,16 @@ class Tab:
         self.open("Learn")
         self.choose("Lesson", title)
 
+    def explore(self, title: str) -> None:
+        """Open a lesson with the arm on show, also if it asks about others."""
+        shown = self.row("Robot").locator("input:visible").first
+        robot = shown.input_value()
+        self.choose_lesson(title)
+        expect(self.page.locator(f'[data-guide=goal][data-lesson="{title}"]')).to_be_visible()
+        if shown.input_value() != robot:
+            self.choose("Robot", robot)
+            expect(self.page.locator("[data-guide=elsewhere]")).to_be_visible()
+
     def show_answer(self, lesson: str, by_key: bool = False) -> None:
         """Once the lesson of this title is on show, have the answer to its step shown, if one is asked for.
 

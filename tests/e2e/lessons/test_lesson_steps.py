@@ -12,7 +12,9 @@ from playwright.sync_api import Locator, expect
 
 import kin
 from app.exercises.contract import Posed
+from app.exercises.lesson_text import texts_of
 from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.content import arm_for
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
 from kin.poses import roll_pitch_yaw
@@ -104,7 +106,7 @@ def test_a_lesson_from_its_first_step_to_its_check(desktop: Tab, lesson: type[Le
     tab.choose("Lesson", "None")
     tab.select(PIONEER)
     tab.choose("Lesson", lesson.title)
-    outline = lesson.outline(PIONEER, Units())
+    outline = lesson.asked(arm_for(texts_of(lesson.key), PIONEER), Units())
     questions = dict(outline.questions())
     steps = tab.page.locator("[data-guide=steps]")
     steps.get_by_role("button", name=re.compile(r"^Step 1\b")).click()  # where it was left

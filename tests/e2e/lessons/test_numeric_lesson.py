@@ -16,7 +16,7 @@ PLANAR = kin.get_robot("planar2r")
 def test_iterations_by_mouse_and_by_keyboard(desktop: Tab) -> None:
     tab, page = desktop, desktop.page
     tab.select(PLANAR)
-    tab.choose_lesson("Numeric IK")
+    tab.explore("Numeric IK")
     tab.show_answer("Numeric IK")
     outcome, iterate = page.locator("[data-outcome]"), page.locator("[data-iterate]")
     expect(outcome).to_have_attribute("data-outcome", "reached")

@@ -22,7 +22,7 @@ PUMA, SRS, PRINTED, PIONEER = (
 
 def learn(tab: Tab, robot: kin.Robot, lesson: str) -> None:
     tab.show(robot)  # at home: a robot keeps its pose while others are shown
-    tab.choose_lesson(lesson)
+    tab.explore(lesson)
     tab.show_answer(lesson)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from lesson_arms import arms_of
 from page import Tab
 from playwright.sync_api import Browser, expect
 
@@ -114,8 +115,8 @@ def divided(browser: Browser, pages: Sequence[str], css: str = CSS) -> dict[tupl
 
 
 def sheet_of(lesson: type[Lesson], robot: kin.Robot) -> str:
-    outline = lesson.outline(robot, DEFAULT_UNITS)
-    parts, left = parts_of(outline), lesson.left(robot)
+    outline = lesson.asked(robot, DEFAULT_UNITS)
+    parts, left = parts_of(outline), lesson.left
     return page_html(Sheet(lesson.title, robot, robot.q_home, DEFAULT_UNITS, outline.goal, parts, (), left))
 
 
@@ -127,7 +128,7 @@ def sheet_of(lesson: type[Lesson], robot: kin.Robot) -> str:
     ],
 )
 def test_no_page_ends_inside_a_sentence(browser: Browser, lesson: type[Lesson]) -> None:
-    sheets = [sheet_of(lesson, kin.get_robot(name)) for name in ("pioneer5", "planar2r", "redundant7-craig")]
+    sheets = [sheet_of(lesson, robot) for robot in arms_of(lesson.key)]
     for at, found in divided(browser, sheets).items():
         assert found["divided"] == found["alone"] == [], at
         assert 2 <= found["count"] == found["pages"], at

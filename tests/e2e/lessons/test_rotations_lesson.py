@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.full]
 def test_gimbal_lock_and_a_chain_by_mouse_and_by_keyboard(desktop: Tab) -> None:
     tab, page = desktop, desktop.page
     tab.select(kin.get_robot("planar2r"))
-    tab.choose_lesson("Rotations and frames")
+    tab.explore("Rotations and frames")
     tab.show_answer("Rotations and frames")
     lock, chain = page.locator("[data-lock]"), page.locator("[data-chain]")
     expect(lock).to_have_attribute("data-lock", "far")

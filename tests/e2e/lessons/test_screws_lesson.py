@@ -18,7 +18,7 @@ def test_screws_by_mouse_and_keyboard(desktop: Tab) -> None:
     tab.open("Learn")
     tab.choose("Lesson", "None")
     tab.select(SCARA)
-    tab.choose_lesson("Screws")
+    tab.explore("Screws")
     tab.show_answer("Screws")
     table = page.locator('table[aria-label="screws"]')
     expect(table.locator("[data-s]")).to_have_count(24)

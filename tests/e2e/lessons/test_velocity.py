@@ -20,8 +20,7 @@ IIWA = kin.get_robot("iiwa14")
 
 
 def open_lesson(tab: Tab) -> None:
-    tab.page.get_by_role("tab", name="Learn").click()
-    tab.choose("Lesson", "Velocity")
+    tab.explore("Velocity")
     tab.show_answer("Velocity")
     expect(tab.page.locator("[data-singular]")).to_be_visible()
 
