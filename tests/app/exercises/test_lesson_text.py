@@ -62,6 +62,13 @@ def test_every_text_is_made_for_the_lessons_arms_in_all_units(lesson: type[Lesso
             assert not re.search(r"[{}]|\bnan\b", text), (robot.id, text)
 
 
+def test_few_arms_need_few_conditions() -> None:
+    for file in FILES.values():
+        assert 2 <= len(load_lesson(file).arms) <= 4, file
+    conditions = [len(re.findall(r"\bwhen = ", file.read_text(encoding="utf-8"))) for file in FILES.values()]
+    assert sum(conditions) <= 20, dict(zip(FILES, conditions, strict=True))
+
+
 @pytest.mark.parametrize("key", FILES)
 def test_every_declared_fact_is_used(key: str) -> None:
     text = re.split(r"\n\[(?!facts\])", Path(FILES[key]).read_text(encoding="utf-8"), maxsplit=1)[1]
