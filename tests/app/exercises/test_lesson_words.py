@@ -284,6 +284,13 @@ def test_the_page_shows_a_valid_file(tmp_path: Path, capsys: pytest.CaptureFixtu
         ('pose = "home"', 'pose = "away"', "steps[0].pose: got 'away', expected one of bent, home"),
         ('value = "from_axis"', 'value = "axis"', "mistakes[0].value: got 'axis', expected a name from [facts]"),
         ('kind = "number"', 'kind = "numbers"', "steps[0].question.kind: got 'numbers', expected one of"),
+        (
+            'value = "speed"',
+            'value = "speed"\nwithout = ["sine"]',
+            "question.without[0]: got 'sine', expected one of",
+        ),
+        ('arms = ["pioneer5"', 'arms = ["nobody"', "arms: got 'nobody', expected ids of arms: "),
+        ('arms = ["pioneer5"', 'arms = ["so101"', "arms: got 'so101', expected arms of the lesson: pioneer5"),
     ],
 )
 def test_own_questions_are_asked_about_every_arm(
