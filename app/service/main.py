@@ -243,9 +243,8 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         except (InputError, RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
-        fk(
-            store.robots[0], store.robots[0].q_home
-        )  # loads the kernels, which all copies of this process then have
+        arm = store.robots[0]
+        fk(arm, arm.q_home)  # loads the kernels, which all copies of this process then have
         if settings.token is None and not settings.read_only:
             if not is_loopback(listener):
                 print(OPEN_TO_ALL, file=sys.stderr, flush=True)

@@ -1,7 +1,7 @@
 """The names of an arm's solver and branches, as lists of arms show them.
 
-To choose the solver of an arm that fits no family, test poses are solved, which for all built-in arms takes 0.3 s,
-as long as the rest of `kinboard robots`. Their names are therefore kept in ``kin/robots/solvers.json``, which
+To choose the solver of an arm that fits no family, test poses are solved. For all built-in arms that takes 0.3 s,
+the rest of `kinboard robots` 0.7 s. Their names are therefore kept in ``kin/robots/solvers.json``, which
 ``scripts/arms_page.py`` writes. A test compares the file with the solvers; an arm that is not in it is computed.
 """
 
