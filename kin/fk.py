@@ -36,19 +36,19 @@ class _Compiled:
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.fk_one, 1, 1, (4, 4))
+        return direct(fk_kernels.fk_one)
 
     @cached_property
     def fk_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.fk_many, 1, 2, (None, 4, 4))
+        return direct(fk_kernels.fk_many)
 
     @cached_property
     def positions_many(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(fk_kernels.positions_many, 1, 2, (None, 3))
+        return direct(fk_kernels.positions_many)
 
     @cached_property
     def jacobian_one(self) -> Callable[[Array, Array, Array], bool]:
-        return direct(jacobian_kernels.jacobian_one, 1, 1, (6, None))
+        return direct(jacobian_kernels.jacobian_one)
 
 
 _compiled = _Compiled()

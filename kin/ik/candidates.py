@@ -404,5 +404,5 @@ def _meets(requirement: Requirement, at: Array, targets: Array, i: int, e: Array
 
 @cache
 def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
-    """`measure_and_sort`, which checks its arrays: C-contiguous, and of the types given in `Rows`."""
-    return direct(measure_and_sort, None, (4, 4), 1, 1, None)
+    """`measure_and_sort`, without the call around it."""
+    return direct(measure_and_sort)

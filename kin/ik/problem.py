@@ -289,8 +289,8 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
 
 @cache
 def _straighten() -> Callable[[Array, float, Array], float]:
-    """`straighten`, which checks its arrays."""
-    return direct(straighten, _POSE, None, _POSE)
+    """`straighten`, without the call around it."""
+    return direct(straighten)
 
 
 def listed(targets: object) -> list[ArrayLike] | Array:

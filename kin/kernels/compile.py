@@ -1,4 +1,4 @@
-"""Decorators of kernels, and kernels that check the arrays they are called with.
+"""Decorators of kernels, and what a kernel is.
 
 KINBOARD_KERNELS says what kernels are: ``c`` (the default) calls the extension that was compiled from them before
 the program began (:mod:`kin.kernels.ahead`); ``python`` runs them as they are written, for debugging and coverage.
@@ -46,10 +46,11 @@ class Kernel:
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._call(*arguments)
+        return self.function(*arguments)
 
     @cached_property
-    def _call(self) -> Callable[..., Any]:
+    def function(self) -> Callable[..., Any]:
+        """What is called."""
         entry = None if PLAIN else ahead.entries().get(self.name)
         return entry or written(self.py_func)
 
@@ -73,34 +74,17 @@ def inlined(function: _Kernel) -> _Kernel:
     return jit(function)
 
 
-def direct(kernel: Any, *arrays: int | tuple[int | None, ...] | None) -> Callable[..., Any]:
-    """A kernel as a function that is called without a detour.
+def direct(kernel: Any) -> Callable[..., Any]:
+    """The function of a kernel, without the call around it, which takes half as long as a small kernel.
 
-    Args:
-        arrays: of each argument what plain Python checks, as the extension does by itself: of a C-contiguous
-            float64 array its shape, in which None stands for any length, or its number of axes. None: nothing.
-
-    Returns:
-        The function. It raises `TypeError` for an array that is not as described: callers need not check it, and
-        deal with whatever else they accept when that happens.
+    An entry of the extension raises `TypeError` for arguments that are not as ``entries.txt`` says, and Python for
+    other numbers than floats: callers need not check them, and deal with what else they accept when that happens.
     """
-    if not PLAIN and (entry := ahead.entries().get(kernel.name)) is not None:
-        return entry
-    shapes = [(None,) * each if isinstance(each, int) else each for each in arrays]
+    function: Callable[..., Any] = kernel.function
 
     def call(*arguments: Any) -> Any:
-        for value, shape in zip(arguments, shapes, strict=True):
-            if shape is not None and not fits(value, shape):
-                raise TypeError(f"{value!r} is not a C-contiguous float64 array {shape}")
-        return kernel(*arguments)
+        if any(isinstance(each, np.ndarray) and each.dtype != np.float64 for each in arguments):
+            raise TypeError("an array of other numbers than floats")
+        return function(*arguments)
 
-    return call
-
-
-def fits(value: object, shape: tuple[int | None, ...]) -> bool:
-    """Whether a value is a C-contiguous array of floats with this shape."""
-    if type(value) is not np.ndarray or value.dtype != np.float64 or value.ndim != len(shape):
-        return False
-    if not (value.flags.c_contiguous and value.flags.aligned):
-        return False
-    return all(wanted in (None, there) for wanted, there in zip(shape, value.shape, strict=True))
+    return call if PLAIN else function

@@ -159,9 +159,8 @@ class BatchKernels:
     seeded: Seeded | None = field(default=None, kw_only=True)
 
     def unchecked(self) -> BatchKernels:
-        """The same, whose arrays are checked (`kin.kernels.compile.direct`): another one is a `TypeError`."""
-        one, many = direct(self.one, 1, (4, 4), None, 1, 2), direct(self.many, 1, 3, 1, 1, 3)
-        return replace(self, one=one, many=many)
+        """The same without the calls around them, see `kin.kernels.compile.direct`."""
+        return replace(self, one=direct(self.one), many=direct(self.many))
 
 
 class PlainKernels(BatchKernels):

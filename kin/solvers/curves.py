@@ -14,8 +14,7 @@ isolated solutions.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 
 from kin.angles import wrap, wrapped
 from kin.axes import size
-from kin.kernels.compile import direct, jit
+from kin.kernels.compile import jit
 from kin.kernels.dense import least_pivot, singular_values
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
@@ -201,12 +200,6 @@ def follow(
     return out.shape[0], False
 
 
-@cache
-def _nearly_singular() -> Callable[[Array, int, float, Whole, Array], int]:
-    """`nearly_singular`, which checks its arrays."""
-    return direct(nearly_singular, 1, None, None, None, 2)
-
-
 @lru_cache(maxsize=256)
 def _size(robot: Robot) -> float:
     """The arm's size, which takes longer to compute than all else that a regular target needs."""
@@ -231,7 +224,7 @@ def curves_among(
     """
     if not rows or not isolated(task, free):
         return [], rows
-    near = _nearly_singular()(robot.model, task, _size(robot), free, q[rows[:_BITS]])
+    near = nearly_singular(robot.model, task, _size(robot), free, q[rows[:_BITS]])
     singular = [row for i, row in enumerate(rows[:_BITS]) if near >> i & 1] if near else []
     curves: list[Curve] = []
     gone: set[int] = set()

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
 from kin.axes import inverse
-from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import at_every_turn, turn_around
@@ -42,12 +39,6 @@ _OBSTACLES: dict[int, ObstacleCode] = {
     2: "wrist centre too near to the shoulder",
     3: "wrist centre beyond the elbow's reach",
 }
-
-
-@cache
-def _answer() -> Callable[[Array, Array, Array, float, bool, float, Array, Array], int]:
-    """`answer`, which checks its arrays."""
-    return direct(answer, 1, 2, 2, None, None, None, 2, 2)
 
 
 def match(robot: Robot) -> Offset7 | None:
@@ -103,7 +94,7 @@ class Offset7(ClosedForm):
         p, requested, i = problem, problem.values[0], self.given
         out, arcs = np.empty((8, 8)), np.empty((INTERVALS, 3))
         joints = np.array((p.seed, p.lower, p.upper))
-        count = _answer()(self.kernels.params, p.T, joints, requested, p.respect_limits, p.weight, arcs, out)
+        count = answer(self.kernels.params, p.T, joints, requested, p.respect_limits, p.weight, arcs, out)
         found = at_every_turn(arcs[:count], float(p.lower[i]), float(p.upper[i]))
         gap, obstacle = 0.0, None
         if all(map(math.isnan, out[:, 0].tolist())):

@@ -9,9 +9,7 @@ its row strictly inside the interval, with the redundancy parameter held (:mod:`
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,6 @@ from numpy.typing import NDArray
 from kin.angles import TURN, apart, wrapped
 from kin.axes import size
 from kin.fk import fk, jacobian
-from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
@@ -91,7 +88,7 @@ class Rounded7(Rounded):
             self._add_from_intervals(p, setting, limits, (arcs, places), rows)
             missed, known = np.isnan(rows[:, 0]), known | _branches_of(arcs[_have(arcs, p.values[0])])
         else:
-            bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
+            bits = choose_rows(self.robot.model, p.T, setting, limits, arcs, places, rows)
             missed = (bits >> np.arange(8)) & 1 > 0
             within = _branches_of(arcs)
             known = within if p.respect_limits else known | within  # a row outside the limits may be lost
@@ -180,7 +177,7 @@ class Rounded7(Rounded):
         merged = _merged(wide.q)
         known = np.concatenate([outer, inner])
         ends = self._postures(p, known, _ENDS)
-        _ends()(self.robot.model, p.T, setting, limits, known, ends, places, arcs, sure)
+        move_ends(self.robot.model, p.T, setting, limits, known, ends, places, arcs, sure)
         certain = True
         if not sure.all():
             moved = arcs, places, sure
@@ -195,10 +192,9 @@ class Rounded7(Rounded):
 
     def _joined(self, arcs: Array) -> Array:
         """The same intervals, those of an angle joined where they touch."""
-        out = np.empty(arcs.shape)  # not an array that compiled code has made: `direct` takes none of these
         if self._joint >= 0:
-            out[:] = arcs
-            return out
+            return arcs.copy()
+        out = np.empty(arcs.shape)
         return out[: joined(np.ascontiguousarray(arcs), out)]
 
     def _postures(self, p: SolverInput, arcs: Array, shares: Array) -> Array:
@@ -256,7 +252,7 @@ class Rounded7(Rounded):
         if here.any():
             spans, found = arcs[here], np.full((8, 8), math.nan)
             spans[:, 1:] = p.values[0]
-            _choose()(self.robot.model, p.T, setting, limits, spans, places[here], found)
+            choose_rows(self.robot.model, p.T, setting, limits, spans, places[here], found)
             there = ~np.isnan(found[:, 0])
             rows[there] = found[there]
 
@@ -418,15 +414,3 @@ def _is_known(arcs: list[tuple[float, float, float]], branch: float, value: floa
 def _are_alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
     """Whether two intervals of an angle have the same ends."""
     return abs(math.remainder(a[0] - b[0], TURN)) < _ALIKE and abs(a[1] - a[0] - b[1] + b[0]) < _ALIKE
-
-
-@cache
-def _ends() -> Callable[..., None]:
-    """`move_ends`, which checks its arrays."""
-    return direct(move_ends, 1, (4, 4), 1, 2, 2, 3, 3, 2, 1)
-
-
-@cache
-def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int]:
-    """`choose_rows`, which checks its arrays."""
-    return direct(choose_rows, 1, (4, 4), 1, 2, 2, 3, 2)

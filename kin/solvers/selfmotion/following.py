@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels.compile import direct
 from kin.solvers.selfmotion.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.transforms import Array
 
@@ -32,7 +28,7 @@ class Motions:
             were lost, see `trace`.
         """
         pieces, postures, starts = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7)), starts.copy()
-        count = _trace()(*self._goal, starts, self._paths, pieces, postures)
+        count = trace(*self._goal, starts, self._paths, pieces, postures)
         return pieces[:count], postures[:count], np.isnan(starts[:, 0])
 
     @property
@@ -40,9 +36,3 @@ class Motions:
         """Points ``(m, 7)`` of all motions, one after the other."""
         count, *ends = self._paths.ends.tolist()
         return self._paths.points[: ends[count - 1] if count else 0, :7]
-
-
-@cache
-def _trace() -> Callable[..., int]:
-    """`trace`, which checks its arrays."""
-    return direct(trace, 1, (4, 4), 1, 2, None, 2, None, 2, 3)

@@ -13,7 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import platformdirs
 import platformdirs.macos
 import platformdirs.windows
@@ -166,15 +165,6 @@ def test_the_best_level_comes_first(monkeypatch, machine, features, expected):
     module = SimpleNamespace(_multiarray_umath=SimpleNamespace(__cpu_features__=dict.fromkeys(features, True)))
     monkeypatch.setattr(ahead.np, "_core", module)
     assert list(ahead.levels()) == expected
-
-
-def test_plain_functions_check_arrays_as_compiled_ones_do(monkeypatch):
-    monkeypatch.setattr(chosen, "PLAIN", True)
-    total = chosen.direct(lambda a, x: a.sum() * x, (2, None), None)
-    assert total(np.ones((2, 3)), 2.0) == 12.0
-    for wrong in (np.ones((3, 2)), np.ones((2, 3), int), [[1.0], [2.0]], np.ones((2, 4))[:, ::2]):
-        with pytest.raises(TypeError, match=r"array \(2, None\)"):
-            total(wrong, 2.0)
 
 
 def test_another_value_than_c_and_python_is_refused(monkeypatch):
