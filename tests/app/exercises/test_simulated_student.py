@@ -119,7 +119,7 @@ def test_a_student_hears_which_mistake_was_made(questions: Callable[[], Question
     table = by_question(questions())
     everything = sum(table.values(), Counter[str]())
     made = everything["named"] + everything["wrongly"] + everything["silent"]
-    assert made > 100
+    assert made > 50
     assert everything["named"] >= 0.95 * made, table
     assert everything["wrongly"] <= 0.01 * made, table
     assert everything["random, named"] <= 0.03 * everything["random"], table

@@ -221,7 +221,7 @@ def test_a_reason_that_answers_the_question_after_it_is_found() -> None:
 def test_an_answer_on_show_is_found(server: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Progress, "withheld", frozenset())
     velocity = next(lesson for lesson in LESSONS if lesson.key == "velocity")
-    assert "A column" in leaks(server, velocity)
+    assert "The ellipsoid" in leaks(server, velocity)
 
 
 def test_steps_withhold_facts_that_there_are() -> None:

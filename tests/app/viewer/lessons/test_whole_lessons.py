@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from fake_browser import FakeBrowser
+from lesson_arms import arms_of
 from live_server import serve_viewer
 
 from app.exercises.contract import Posed
@@ -44,10 +45,9 @@ def wrong_answers(question: Question) -> Iterator[tuple[list[object], object]]:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("robot_id", ["pioneer5", "iiwa14"])
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
-def test_a_lesson_is_answered_from_end_to_end(server: int, lesson: Any, robot_id: str) -> None:
-    robot = STORE.get(robot_id)
+def test_a_lesson_is_answered_from_end_to_end(server: int, lesson: Any) -> None:
+    robot = arms_of(lesson.key)[-1]
     with FakeBrowser(server) as tab:
         tab.settle()
         tab.choose(robot.name)
@@ -59,7 +59,7 @@ def test_a_lesson_is_answered_from_end_to_end(server: int, lesson: Any, robot_id
             tab.settle()
             assert BROKEN not in tab.html, f"{lesson.key}, {key}: {value}"
 
-        outline = lesson.outline(robot, Units())
+        outline = lesson.asked(robot, Units())
         at = -1
         for key, question in outline.questions():
             step = len(outline.steps) if key.startswith("c") else int(key.removeprefix("e")) - 1

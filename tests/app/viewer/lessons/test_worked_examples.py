@@ -14,6 +14,7 @@ import numpy as np
 import numpy_arm
 import pytest
 from fake_browser import FakeBrowser
+from lesson_arms import arms_of
 from live_server import serve_viewer
 
 from app.exercises.fields import ExerciseFileError
@@ -442,7 +443,7 @@ def test_only_the_example_is_seen_and_everything_comes_back(server: int, key: st
         tab.set("Lesson", lesson.title)
         tab.wait(lambda: "Watch a worked example" in tab.html)
         tab.settle()
-        tab.set(label(STORE.robots[0], 0), 20.0)
+        tab.set(label(arms_of(key)[0], 0), 20.0)
         tab.settle()
         tab.say("undo", None)  # so that there is something to redo
         tab.settle()

@@ -10,6 +10,7 @@ import numpy_arm
 import pytest
 from arms import CLASSICS
 from bare_page import STORE, bare_page
+from lesson_arms import arms_of
 
 import kin
 from app.viewer.arm import Arm
@@ -154,6 +155,9 @@ def test_questions_are_about_their_own_pose_wherever_the_arm_is(robot: Robot) ->
 @ARMS
 def test_numbers_are_on_show_when_they_are_answered_or_wanted(robot: Robot) -> None:
     known, count = facts(robot, 0), len(facts(robot, 0).keys)
+    if robot not in arms_of("inverse"):
+        assert known.opened == (True,) * count, "nothing is asked"
+        return
     assert known.opened == (False,) * count
     answered = (True, *[False] * (count - 1))
     assert replace(known, settings=replace(known.settings, answered=answered)).opened == answered
@@ -193,7 +197,7 @@ def test_a_wrong_angle_is_drawn_as_the_posture_that_has_it(robot: Robot) -> None
 
 
 # Messages for one new configuration, as many as before this lesson was declared.
-FRAMES = {"planar2r": 6.0, "pioneer5": 8.0, "puma560": 8.0, "redundant7-craig": 9.0}
+FRAMES = {"pioneer5": 8.0, "puma560": 8.0, "redundant7-craig": 9.0}
 
 
 @pytest.mark.parametrize("name", FRAMES)

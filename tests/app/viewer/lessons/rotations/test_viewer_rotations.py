@@ -286,7 +286,7 @@ def turned(tab: FakeBrowser) -> np.ndarray:
 
 @pytest.mark.full
 def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:
-    robot = ROBOTS[0]
+    robot = arms_of("rotations")[0]
     with FakeBrowser(server) as tab:
         tab.settle()
         tab.open_lesson("Rotations and frames")

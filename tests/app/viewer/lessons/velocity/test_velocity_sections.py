@@ -188,8 +188,8 @@ def shown_q(tab: FakeBrowser, robot: kin.Robot) -> Array:
 def run_a_self_motion(tab: FakeBrowser, panda: kin.Robot, ended: Callable[[Array], bool], timeout: float) -> None:
     """Run it until `ended` at the configuration shown; the tool was held and the measure has grown."""
     tab.settle()
+    tab.set("Lesson", "Velocity")
     tab.choose(panda.name)
-    tab.open_lesson("Velocity")
     tab.wait(lambda: "(I−J⁺J)z" in tab.html)
     tab.set(label(panda, 2), 40.0)
     tab.settle()
