@@ -26,7 +26,7 @@ _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 def _chosen() -> str:
     found = os.environ.get("KINBOARD_KERNELS") or C
     if found not in (C, PYTHON):
-        raise ValueError(f"KINBOARD_KERNELS={found}: it is one of {C}, {PYTHON}")
+        raise ImportError(f"KINBOARD_KERNELS={found}: it is one of {C}, {PYTHON}")
     return found
 
 
