@@ -157,6 +157,7 @@ def test_a_whole_lesson_uses_the_facts_of_the_lesson_alone(tmp_path: Path) -> No
         ('x = "a number"', 'y = "a number"', "facts.y: got 'y', expected a fact of the lesson: f, x"),
         ('value = "f(x)"', 'value = "g(x)"', "steps[0].question.value: got 'g', expected a name from [facts]"),
         ("There are {kind}", "There are {kin}", "steps[0].text: got '{kin}', expected a name from [facts]"),
+        ('title = "One"', 'title = "One"\n"a\\u001b[2J" = 1', "steps[0].a\\x1b[2J: got 1, expected no such field"),
     ):
         with pytest.raises(ExerciseFileError, match=re.escape(message)):
             words(tmp_path, own.replace(old, new), "velocity.toml")
