@@ -157,9 +157,11 @@
     node.scrollIntoView({ block: "nearest" });
     dispatchEvent(new CustomEvent("kinboard-say", { detail: node.textContent }));
   }
-  for (const kind of ["pointerdown", "wheel"]) addEventListener(kind, () => { expected = null; }, { capture: true, passive: true });
-  // What has just been opened is seen from its head: a course's bar, an exercise, the list of a course, a step.
-  let open = "", step = "";
+  for (const kind of ["pointerdown", "wheel"]) addEventListener(kind, () => { expected = null; until = 0; }, { capture: true, passive: true });
+  // What has just been opened is seen from its head: a course's bar, an exercise, the list of a course, a step. What
+  // stands below comes a moment later, and until then there may be too little to scroll.
+  const SETTLES = 1000; // ms
+  let open = "", step = "", until = 0;
   function reveal() {
     const bar = document.querySelector("[data-course=bar]");
     const head = bar ?? document.querySelector("[data-exercises=task], [data-course=follow], [data-course=choose]");
@@ -167,8 +169,9 @@
     if (now !== open) {
       const first = open === "";
       open = now;
-      if (head && !first && head.getBoundingClientRect().height) requestAnimationFrame(() => head.scrollIntoView({ block: "start" }));
+      until = first ? 0 : performance.now() + SETTLES;
     }
+    if (head?.getBoundingClientRect().height && performance.now() < until) requestAnimationFrame(() => head.scrollIntoView({ block: "start" }));
     const [goal, steps] = ["goal", "steps"].map((name) => document.querySelector(`[data-guide=${name}]`));
     if (!steps || !goal) { if (document.querySelector("[data-hints]")) step ||= "none"; return; }
     const [lesson, before] = [goal.dataset.lesson, step];

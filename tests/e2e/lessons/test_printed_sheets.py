@@ -136,5 +136,5 @@ def test_no_page_ends_inside_a_sentence(browser: Browser, lesson: type[Lesson]) 
 
 def test_without_its_rules_a_sheet_is_divided(browser: Browser) -> None:
     css = re.sub(r"break-(?:inside|after): avoid;", "", CSS)
-    sheets = [sheet_of(lesson, kin.get_robot("ur5")) for lesson in LESSONS]
+    sheets = [sheet_of(lesson, arms_of(lesson.key)[0]) for lesson in LESSONS]
     assert any(found["divided"] for found in divided(browser, sheets, css).values())
