@@ -283,7 +283,7 @@
     place();
   });
   function follow() {
-    if (NARROW.matches) root.style.setProperty("--kb-card", `${card()?.offsetHeight ?? 0}px`);
+    root.style.setProperty("--kb-card", `${card()?.offsetHeight ?? 0}px`);
     mark();
     markEdge();
     markSize();

@@ -340,6 +340,21 @@ class FakeBrowser:
         self._owed = True
         return self._number
 
+    @property
+    def commands(self) -> dict[str, str]:
+        """The ids of the palette's commands by their labels."""
+        found: dict[str, str] = {}
+        for m in self.log:
+            if m["type"] == "RegisterCommandMessage":
+                found[m["uuid"]] = m["props"]["label"]
+            elif m["type"] == "RemoveCommandMessage":
+                del found[m["uuid"]]
+        return {label: uuid for uuid, label in found.items()}
+
+    def trigger(self, label: str) -> None:
+        """Choose a command of the palette."""
+        self.send("CommandTriggerMessage", uuid=self.commands[label])
+
     def answer_storage(self, uuid: str, value: str | None = None) -> None:
         """Answer a question about the browser's storage."""
         self.send("LocalStorageGetItemResponseMessage", request_uuid=uuid, value=value, error=None)

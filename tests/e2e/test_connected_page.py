@@ -171,6 +171,17 @@ def test_the_words_fit_a_phone(phone: Tab, address: str) -> None:
     for arm in connected(phone, address):
         assert_framed(phone)
         phone.screenshot("driven-phone")
+        words, stop = (
+            phone.page.locator("#kb-driven p").bounding_box(),
+            phone.status.get_by_role("button", name="Stop"),
+        )
+        card, button = phone.status.bounding_box(), stop.bounding_box()
+        assert words is not None
+        assert card is not None
+        assert button is not None
+        assert card["y"] == pytest.approx(words["y"] + words["height"], abs=0.5)
+        assert button["height"] >= 44, "large enough for a finger"
+        stop.click(trial=True)  # nothing lies over it
         arm.drives = "x" * 60
         expect(phone.page.locator("#kb-driven")).to_contain_text("x" * 60)
         seen = phone.page.evaluate(SEEN)

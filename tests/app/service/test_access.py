@@ -341,6 +341,8 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             assert "data-hints" not in tab.html, "no hint asks to drag what cannot be dragged"
             assert tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.7)
             before = tab.tool_pose()
+            assert not tab.commands, "nor does the palette offer anything"
+            tab.send("CommandTriggerMessage", uuid="guessed")
             tab.say("feature", ["robot", ["start"], "planar-2r"])
             tab.set("1 rotating base", 10.0)
             tab.drag(position=(0.1, 0.1, 0.1))

@@ -247,6 +247,10 @@ def test_who_is_frozen_cannot_move(room: Class) -> None:
     number = student.say("field", ["nothing", "1"])
     student.wait(lambda: student.script["reply"][0] >= number)
     assert "frozen" in student.script["reply"][1]
+    for label in ("Random configuration", "Arm: UR5"):
+        student.trigger(label)
+    student.settle()
+    assert (student.value("1 rotating base"), student.value("Robot")) == (30.0, "Pioneer arm")
     number = student.say("feature", ["sheet", ["page", 1], None])  # printing a worksheet moves nothing
     student.wait(lambda: student.script["reply"] == [number, "", []])
     press(student, "go")

@@ -28,21 +28,6 @@ def page(port) -> Iterator[FakeBrowser]:
         yield page
 
 
-def registered(page: FakeBrowser) -> dict[str, str]:
-    """The ids of the commands by their labels."""
-    found: dict[str, str] = {}
-    for m in page.log:
-        if m["type"] == "RegisterCommandMessage":
-            found[m["uuid"]] = m["props"]["label"]
-        elif m["type"] == "RemoveCommandMessage":
-            del found[m["uuid"]]
-    return {label: uuid for uuid, label in found.items()}
-
-
-def run(page: FakeBrowser, label: str) -> None:
-    page.send("CommandTriggerMessage", uuid=registered(page)[label])
-
-
 def test_everything_that_the_registries_know_is_listed_once():
     names = [robot.name for robot in Store().robots]
     labels = [each.label for each in commands(TABS, (), names, builtin_exercises())]
@@ -58,7 +43,7 @@ def test_everything_that_the_registries_know_is_listed_once():
 
 
 def test_a_page_offers_it_all_with_its_exports_and_the_keys(page):
-    found = registered(page)
+    found = page.commands
     assert {f"Save the arm as {about}" for about, *_ in KINDS.values()} <= set(found)
     assert {f"Save the motion as {title}" for title in MOTIONS.values()} <= set(found)
     assert "Save the worksheet as CSV" in found
@@ -70,30 +55,30 @@ def test_a_page_offers_it_all_with_its_exports_and_the_keys(page):
 
 
 def test_commands_do_what_the_controls_do(page):
-    run(page, "Arm: UR5")
+    page.trigger("Arm: UR5")
     page.wait(lambda: page.value("Robot") == "UR5")
     page.wait(lambda: page.script["undo"] == "Robot")
-    run(page, "Undo")
+    page.trigger("Undo")
     page.wait(lambda: page.value("Robot") != "UR5")
-    run(page, "Exercise: " + builtin_exercises()[0].title)
+    page.trigger("Exercise: " + builtin_exercises()[0].title)
     page.wait(lambda: page.value("Lesson") == "Exercises" and builtin_exercises()[0].title in page.html)
     assert "tab" in page.kept_as
-    run(page, f"Lesson: {LESSONS[0].title}")
+    page.trigger(f"Lesson: {LESSONS[0].title}")
     page.wait(lambda: page.value("Lesson") == LESSONS[0].title)
-    run(page, "Save the arm as URDF")
+    page.trigger("Save the arm as URDF")
     page.wait(lambda: any(m["type"].startswith("FileTransferStart") for m in page.log))
 
 
 def test_an_exercise_is_opened_in_one_step_and_no_other_one_on_the_way(port):
     first, other = builtin_exercises()[:2]
     with FakeBrowser(port) as page:
-        run(page, f"Exercise: {first.title}")
+        page.trigger(f"Exercise: {first.title}")
         page.wait(lambda: f'data-exercise="{first.id}"' in page.html)
-        run(page, f"Lesson: {LESSONS[0].title}")
+        page.trigger(f"Lesson: {LESSONS[0].title}")
         page.wait(lambda: page.value("Lesson") == LESSONS[0].title and page.script["undo"] == "Lesson")
-        run(page, f"Exercise: {other.title}")
+        page.trigger(f"Exercise: {other.title}")
         page.wait(lambda: f'data-exercise="{other.id}"' in page.html and page.script["undo"] == "Exercise")
-        run(page, "Undo")
+        page.trigger("Undo")
         page.wait(lambda: page.script["redo"] == "Exercise")
         page.wait(lambda: page.value("Lesson") == LESSONS[0].title)
 
@@ -101,15 +86,15 @@ def test_an_exercise_is_opened_in_one_step_and_no_other_one_on_the_way(port):
 def test_an_own_arm_is_found_while_there_is_one(port):
     with FakeBrowser(port) as page:
         page.settle()
-        before = set(registered(page))
+        before = set(page.commands)
         page.say("feature", ["robot", ["start"], "planar-2r"])
         page.wait(lambda: "My arm" in page.value("Robot"))
         mine = f"Arm: {page.value('Robot')}"
-        page.wait(lambda: set(registered(page)) == before | {mine})
+        page.wait(lambda: set(page.commands) == before | {mine})
         page.say("feature", ["robot", ["delete"], None])
-        page.wait(lambda: set(registered(page)) == before)
+        page.wait(lambda: set(page.commands) == before)
         page.say("undo")
-        page.wait(lambda: set(registered(page)) == before | {mine})
+        page.wait(lambda: set(page.commands) == before | {mine})
 
 
 def test_exercises_that_come_and_go_are_renewed_and_others_stay():
@@ -131,4 +116,4 @@ def test_exercises_that_come_and_go_are_renewed_and_others_stay():
 def test_a_page_that_shows_the_scene_alone_has_none(port):
     with FakeBrowser(port, memory=json.dumps({"embedded": "scene"})) as page:
         page.settle()
-        assert not registered(page)
+        assert not page.commands
