@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,10 +23,11 @@ from kin.codegen.types import Constants
 from kin.differential.metric import extent
 from kin.errors import InputError
 from kin.robot import Robot
+from kin.solvers import pair2
 from kin.solvers.collinear7.branches import solve as solve_collinear7
 from kin.solvers.collinear7.closed_form import Collinear7
 from kin.solvers.common import UNBOUNDED
-from kin.solvers.contract import POSE, BatchKernels, ClosedForm
+from kin.solvers.contract import APPROACH, POSE, BatchKernels, ClosedForm
 from kin.solvers.coupled import Coupled
 from kin.solvers.general5.closed_form import ANY_ORIENTATION, General5
 from kin.solvers.general6 import batch as general6_batch
@@ -44,7 +44,7 @@ from kin.solvers.parallel6.branches import solve as solve_parallel6
 from kin.solvers.parallel6.closed_form import Parallel6
 from kin.solvers.planar4.branches import solve as solve_planar4
 from kin.solvers.planar4.closed_form import Planar4
-from kin.solvers.reversed import ReversedJoints, WrappedKernels
+from kin.solvers.reversed import ReversedJoints
 from kin.solvers.rounded.closed_form import Rounded
 from kin.solvers.rounded.table import SHORT
 from kin.solvers.scaled import Scaled
@@ -280,7 +280,7 @@ def needs_python(robot: Robot, form: ClosedForm) -> InputError:
 
 
 def _by_one(kernels: BatchKernels, form: ClosedForm, robot: Robot) -> Alone:
-    if isinstance(kernels, WrappedKernels) or not isinstance(plain(kernels.one), FunctionType):
+    if plain(kernels.one) is kernels.one:  # plain Python
         raise needs_python(robot, form)
     return Alone(without_limits, kernels.one, np.asarray(kernels.params))
 
@@ -315,11 +315,10 @@ def _general6(form: General6, robot: Robot) -> Alone:
 
 
 def _elimination(form: General6, robot: Robot) -> Alone:
-    kernels, reading = form.kernels, form.reading
-    kernels = kernels.form if isinstance(kernels, WrappedKernels) else kernels
-    if plain(kernels.one) is not plain(general6_batch.branches_one):
+    reading = form.reading
+    if form.solver is not general6_batch.solve_all:
         raise needs_python(robot, form)
-    found = Alone(of_elimination, general6_batch.solve_all, np.asarray(kernels.params))
+    found = Alone(of_elimination, general6_batch.solve_all, np.asarray(form.kernels.params))
     if reading.is_itself:
         return found
     return found.within(wrappers.of_order, order=np.array(reading.order), inverted=reading.inverted)
@@ -335,8 +334,7 @@ def _general7(form: General7, robot: Robot) -> Alone:
 def _turned(form: Turned, robot: Robot) -> Alone:
     if form.whole is not None:
         return alone(robot, form.whole)
-    assert isinstance(form.kernels, WrappedKernels)
-    inner = _by_one(form.kernels.form, form, robot)
+    inner = _by_one(pair2.kernels_of(form.last.others, APPROACH), form, robot)
     return inner.within(wrappers.of_turned, axis=form.last.axis, model=np.asarray(form.last.others.model))
 
 

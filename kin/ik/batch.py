@@ -28,6 +28,7 @@ from kin.ik.options import IKKeywords, IKOptions
 from kin.ik.problem import FAR, IKProblem, listed, never_cancel, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
+from kin.kernels.compile import direct
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers.contract import Candidates, ClosedForm, Many, One
@@ -319,8 +320,8 @@ def _prepare(robot: Robot) -> _Prepared:
     match = named_form_of(robot)
     if match is None:
         raise InputError("robot", robot.id, "an arm with a closed form")
-    kernels, shape = match.kernels.unchecked(), (len(match.branches), robot.n)
-    prepared = _Prepared(kernels.one, kernels.many, kernels.params, robot.q_home.copy(), shape)
+    kernels, shape = match.kernels, (len(match.branches), robot.n)
+    prepared = _Prepared(direct(kernels.one), direct(kernels.many), kernels.params, robot.q_home.copy(), shape)
     robot.__dict__[_CACHE] = prepared
     return prepared
 

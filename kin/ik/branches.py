@@ -10,7 +10,7 @@ import numpy as np
 
 from kin.angles import TURN
 from kin.fk import fk
-from kin.ik.candidates import DISTANCE, ROLL, Rows, accept, measure_rows, ranges, select, unchecked
+from kin.ik.candidates import DISTANCE, ROLL, Rows, accept, measure_and_sort, measure_rows, ranges, select
 from kin.ik.candidates import Flags as Flags
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
@@ -87,7 +87,8 @@ def solve_branches(
     q = found.q.copy()
     k = len(q)
     rows = Rows(q, _empty((k, 5)), _empty(k, _BOOL), _empty(k, _BOOL), _empty(k, _WHOLE))
-    count = unchecked()(problem.requirement, problem.T, problem.seed if seed is None else seed, problem.seed, rows)
+    seed = problem.seed if seed is None else seed
+    count = measure_and_sort(problem.requirement, problem.T, seed, problem.seed, rows)
     on_seed, count = count < 0, max(count, -1 - count)
     branches = Branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,

@@ -7,15 +7,13 @@ then sorted, without duplicates. Solvers do none of this.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kin.angles import TURN, nearest_image, wrap
-from kin.kernels.compile import direct, inlined, jit
+from kin.kernels.compile import inlined, jit
 from kin.kernels.fk import fk_into, fk_many
 from kin.solvers.contract import APPROACH, MASK, POSE
 from kin.solvers.numeric.error import relative_pose
@@ -400,9 +398,3 @@ def _meets(requirement: Requirement, at: Array, targets: Array, i: int, e: Array
     if chord <= requirement.rotation * requirement.rotation:
         return True
     return bool(turned_from(at[i], targets[i], requirement.task) <= requirement.rotation)
-
-
-@cache
-def unchecked() -> Callable[[Requirement, Array, Array, Array, Rows], int]:
-    """`measure_and_sort`, without the call around it."""
-    return direct(measure_and_sort)

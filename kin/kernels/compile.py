@@ -77,10 +77,12 @@ def inlined(function: _Kernel) -> _Kernel:
 def direct(kernel: Any) -> Callable[..., Any]:
     """The function of a kernel, without the call around it, which takes half as long as a small kernel.
 
+    A function of plain Python is what is called, too.
+
     An entry of the extension raises `TypeError` for arguments that are not as ``entries.txt`` says, and Python for
     other numbers than floats: callers need not check them, and deal with what else they accept when that happens.
     """
-    function: Callable[..., Any] = kernel.function
+    function: Callable[..., Any] = kernel.function if isinstance(kernel, Kernel) else kernel
 
     def call(*arguments: Any) -> Any:
         if any(isinstance(each, np.ndarray) and each.dtype != np.float64 for each in arguments):

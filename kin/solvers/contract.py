@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from kin.angles import apart
 from kin.fk import fk, jacobian
-from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers.names import Names
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -158,17 +157,18 @@ class BatchKernels:
     many: Many
     seeded: Seeded | None = field(default=None, kw_only=True)
 
-    def unchecked(self) -> BatchKernels:
-        """The same without the calls around them, see `kin.kernels.compile.direct`."""
-        return replace(self, one=direct(self.one), many=direct(self.many))
+    @classmethod
+    def of_many(cls, params: Array, many: Many) -> BatchKernels:
+        """Those whose `one` is a batch of one target."""
 
+        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+            if not np.isfinite(T).all():
+                out[:] = math.nan
+                return False
+            many(params, T[None], np.array([value]), near, out[None])
+            return True
 
-class PlainKernels(BatchKernels):
-    """Batch kernels that are not compiled, so that there is nothing to unwrap."""
-
-    def unchecked(self) -> BatchKernels:
-        """The same."""
-        return self
+        return cls(params, one, many)
 
 
 def weakest(*known: Completeness) -> Completeness:

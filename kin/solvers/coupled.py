@@ -116,7 +116,7 @@ class Coupled(ClosedForm):
         # Of the free arm: an angle that the joints together turn.
         self.meanings = tuple((name, _THETA.sub(r"the angle at axis \1", text)) for name, text in form.meanings)
         self.off = form.off
-        self.kernels = kernels_by_solving(self, form.kernels)
+        self.kernels = kernels_by_solving(self, form.kernels.params)
 
     def handles(self, task: int) -> bool:
         """Poses only: less leaves the free arm freedom that the joints have not."""

@@ -112,7 +112,7 @@ class SingleValues(WrappedForm):
         self.name, self.title, self.reason, self.lengths = form.name, form.title, form.reason, form.lengths
         self.off = form.off
         self.branches, self.meanings, self.named = _several(form.branches), form.meanings, form.named
-        self.kernels = kernels_by_solving(self, form.kernels)
+        self.kernels = kernels_by_solving(self, form.kernels.params)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """Those of the closed form but for the first."""
@@ -162,7 +162,7 @@ class LockedJoints(ClosedForm):
         self.form, self.inner, self.values = form, inner, values
         self.others = [i for i in range(robot.n) if i not in values]
         self.name, self.title, self.lengths, self.off = inner.name, inner.title, inner.lengths, inner.off
-        self.kernels = kernels_by_solving(self, inner.kernels)
+        self.kernels = kernels_by_solving(self, inner.kernels.params)
         numbers = ", ".join(str(i + 1) for i in values)
         locked = f"joint{'s' * (len(values) > 1)} {numbers} locked: " if values else ""
         self.reason = locked + inner.reason

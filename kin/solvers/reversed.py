@@ -16,9 +16,9 @@ intervals.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice, product
 
 import numpy as np
@@ -191,25 +191,8 @@ class ReversedJoints(WrappedForm):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class WrappedKernels(BatchKernels):
-    """Batch kernels that call those of another closed form.
-
-    Attributes:
-        rebuild: makes the same out of other kernels of that closed form.
-        form: its kernels.
-    """
-
-    rebuild: Callable[[BatchKernels], BatchKernels]
-    form: BatchKernels
-
-    def unchecked(self) -> BatchKernels:
-        """The same with the unchecked kernels of the other closed form."""
-        return self.rebuild(self.form.unchecked())
-
-
-def kernels_by_solving(form: ClosedForm, inner: BatchKernels) -> BatchKernels:
-    """Batch kernels that call `form.solve`, with the parameters of `inner`."""
+def kernels_by_solving(form: ClosedForm, params: Array) -> BatchKernels:
+    """Batch kernels that call `form.solve`."""
 
     def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
         if not np.isfinite(T).all():
@@ -225,7 +208,7 @@ def kernels_by_solving(form: ClosedForm, inner: BatchKernels) -> BatchKernels:
         for k, value in enumerate(np.broadcast_to(values, len(T)).tolist()):
             one(params, T[k], value, near, out[k])
 
-    return WrappedKernels(inner.params, one, many, lambda _: kernels_by_solving(form, inner), inner)
+    return BatchKernels(params, one, many)
 
 
 def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requested: list[int]) -> BatchKernels:
@@ -248,9 +231,7 @@ def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requeste
         form.many(params, T, value_sign * values, near * signs, out)
         reverse(out)
 
-    return WrappedKernels(
-        form.params, one, many, lambda inner: _reversed_kernels(inner, signs, joints, requested), form
-    )
+    return BatchKernels(form.params, one, many)
 
 
 def _opposite(arcs: Array) -> Array:

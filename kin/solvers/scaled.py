@@ -28,7 +28,6 @@ from kin.solvers.contract import (
     SolverInput,
     WrappedForm,
 )
-from kin.solvers.reversed import WrappedKernels
 from kin.solvers.singular import JointValue, Singularity
 from kin.transforms import Array
 
@@ -101,16 +100,11 @@ class Scaled(WrappedForm):
         metres, given = self.metres, self.form.redundancies(POSE)[:1] if self.handles(POSE) else ()
         (each,) = self._sizes(given) or [1.0]
 
-        def one(_: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            found = form.one(form.params, self._target(T), value / each, near / metres, out)
-            out *= metres
-            return found
-
         def many(_: Array, T: Array, values: Array, near: Array, out: Array) -> None:
             form.many(form.params, self._target(T), values / each, near / metres, out)
             out *= metres
 
-        return WrappedKernels(form.params, one, many, self._kernels, form)
+        return BatchKernels.of_many(form.params, many)
 
     def _target(self, T: Array) -> Array:
         """Targets ``(..., 4, 4)`` in the unit."""

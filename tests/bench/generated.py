@@ -41,7 +41,8 @@ import kin  # noqa: E402
 from kin.codegen import files  # noqa: E402
 from kin.codegen.arm import Arm, arm_of  # noqa: E402
 from kin.differential.metric import weights  # noqa: E402
-from kin.ik.candidates import Requirement, Rows, unchecked  # noqa: E402
+from kin.ik.candidates import Requirement, Rows, measure_and_sort  # noqa: E402
+from kin.kernels.compile import direct  # noqa: E402
 from kin.solvers import family_of  # noqa: E402
 from kin.solvers.contract import POSE  # noqa: E402
 
@@ -149,7 +150,8 @@ int many(const double *T, const double *seeds, const double *values, int n) {{
 
 def in_kernels(arm: Arm, T: Any, seeds: Any, values: Any) -> Callable[[], int]:
     """The compiled kernels in this process, called without checks."""
-    robot, kernels, sort, k = arm.robot, arm.form.kernels.unchecked(), unchecked(), arm.rows
+    robot, params, k = arm.robot, arm.form.kernels.params, arm.rows
+    one, sort = direct(arm.form.kernels.one), direct(measure_and_sort)
     q, truths, order = np.empty((k, robot.n)), np.empty((2, k), bool), np.empty(k, np.int64)
     rows = Rows(q, np.empty((k, 5)), truths[0], truths[1], order)
     limits = robot.lower, robot.upper, arm.constants["held"], weights(robot)
@@ -158,7 +160,7 @@ def in_kernels(arm: Arm, T: Any, seeds: Any, values: Any) -> Callable[[], int]:
     def run() -> int:
         total = 0
         for pose, seed, value in zip(T, seeds, values.tolist(), strict=True):
-            kernels.one(kernels.params, pose, value, seed, q)
+            one(params, pose, value, seed, q)
             total += max(sort(requirement, pose, seed, seed, rows), 0)
         return total
 

@@ -28,7 +28,6 @@ from kin.solvers.contract import (
 from kin.solvers.general5.completion import BALL, COMPLETIONS, ROLL, Axes, completed
 from kin.solvers.general5.point import Point3
 from kin.solvers.general6.closed_form import moves_freely
-from kin.solvers.reversed import WrappedKernels
 from kin.solvers.rolled import roll_sense
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
@@ -180,17 +179,17 @@ class General5(ClosedForm):
                 q = np.take_along_axis(found[..., :n], np.maximum(rows, 0)[..., None], axis=1)
                 out[part] = np.where(rows[..., None] >= 0, q, math.nan)
 
+        if not self.rolls:
+            return BatchKernels.of_many(form.params, many)
+
         def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            if not self.rolls:
-                many(params, T[None], np.array([value]), near, out[None])
-                return bool(np.isfinite(T).all())
             longer, rows = np.zeros(6), np.empty((len(out), 6))
             longer[:n] = near
             finite = form.one(params, T, value, longer, rows)
             out[:] = rows[:, :n]
             return finite
 
-        return WrappedKernels(form.params, one, many, self._kernels, form)
+        return BatchKernels(form.params, one, many)
 
     def _completed(self, form: BatchKernels, params: Array, T: Array, values: Array, near: Array) -> Array:
         """Solutions of the six joints ``(N, k, 6)``."""

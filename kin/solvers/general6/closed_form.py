@@ -152,6 +152,7 @@ class General6(ClosedForm):
 
     Attributes:
         reading: the order in which the kernels read the arm's joints.
+        solver: finds the rows of a target in that order.
         proved: of how many of a few random poses the solutions are proved to be all.
     """
 
@@ -171,7 +172,7 @@ class General6(ClosedForm):
         self.robot = robot
         self.tool_on_axis = tool_on_axis
         self.kernels = reading.kernels(kernels)
-        self.reading, self._solve, self.proved = reading, solve, proved
+        self.reading, self.solver, self.proved = reading, solve, proved
         slides = int((~robot.revolute).sum())
         kind = ("revolute joints", "joints, one of which slides,", "joints, two of which slide,")[slides]
         self.reason = f"six {kind} whose axes fit no closed form: all real solutions by elimination"
@@ -230,7 +231,7 @@ class General6(ClosedForm):
 
     def _solve_all(self, T: Array, q: Array) -> int:
         """q ``(16, 6)`` ← the solutions that the kernels find, and what `solve_all` knows of them."""
-        known = int(self._solve(self.kernels.params, self.reading.target(T), q))
+        known = int(self.solver(self.kernels.params, self.reading.target(T), q))
         q[:, list(self.reading.order)] = q.copy()
         return known
 

@@ -19,7 +19,7 @@ import numpy as np
 from kin.angles import apart, wrapped
 from kin.axes import links_of
 from kin.robot import Robot
-from kin.solvers.contract import PlainKernels
+from kin.solvers.contract import BatchKernels
 from kin.solvers.general6.batch import AGREED, NOT_FINITE, OPEN, loop_of
 from kin.solvers.general6.cuts import (
     OFFSET,
@@ -187,17 +187,12 @@ def _known(rows: Array, row: Array, slides: Array, shift: int) -> bool:
     return bool((apart(rows, row, np.roll(slides, shift) == 0.0) < TOLERANCES.merge).any())
 
 
-def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; False if T is not finite."""
-    return solve_opposite(params, T, out) != NOT_FINITE
-
-
 def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
     """out ``(N, 16, 6)`` ← all solutions of each of the targets T ``(N, 4, 4)``."""
     for k in range(len(T)):
         solve_opposite(params, T[k], out[k])
 
 
-def opposite_kernels(params: Array) -> PlainKernels:
-    """Both functions above, for an arm as they read it."""
-    return PlainKernels(params, branches_one, branches_many)
+def opposite_kernels(params: Array) -> BatchKernels:
+    """The batch kernels of an arm as `solve_opposite` reads it."""
+    return BatchKernels.of_many(params, branches_many)

@@ -18,7 +18,6 @@ from kin.axes import Lines, frame_of, inverse, is_zero, lines_of, perpendicular_
 from kin.dh.tables import table_of_chain
 from kin.robot import Robot
 from kin.solvers.contract import BatchKernels
-from kin.solvers.reversed import WrappedKernels
 from kin.transforms import Array
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
@@ -64,11 +63,7 @@ class Reading(NamedTuple):
             form.many(params, self.target(T), values, near[order].copy(), rows)
             out[..., order] = rows
 
-        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            many(params, T[None], np.array([value]), near, out[None])
-            return bool(np.isfinite(T).all())
-
-        return WrappedKernels(form.params, one, many, self.kernels, form)
+        return BatchKernels.of_many(form.params, many)
 
 
 def readings(robot: Robot) -> Iterator[Reading]:

@@ -31,7 +31,6 @@ from kin.solvers.contract import (
 from kin.solvers.general6 import General6
 from kin.solvers.general7.motion import nearest_on_motion, to_images
 from kin.solvers.reduced import fixed
-from kin.solvers.reversed import WrappedKernels
 from kin.solvers.selfmotion.following import Motions
 from kin.solvers.selfmotion.points import JOINT, SETTING
 from kin.solvers.selfmotion.tracing import end_of_motion
@@ -123,11 +122,7 @@ class Fold:
             out[..., self.others] = rows
             out[..., self.joint] = np.where(np.isnan(rows[..., 0]), math.nan, value[:, None])
 
-        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            many(params, T[None], np.array([value]), near, out[None])
-            return bool(np.isfinite(T).all())
-
-        return WrappedKernels(form.params, one, many, self.kernels, form)
+        return BatchKernels.of_many(form.params, many)
 
 
 class Sweep(NamedTuple):

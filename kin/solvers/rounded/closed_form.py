@@ -22,7 +22,6 @@ from kin.solvers.contract import (
     weakest,
 )
 from kin.solvers.numeric import descend_freely
-from kin.solvers.reversed import WrappedKernels
 from kin.solvers.rounded.six import SixJoints
 from kin.transforms import Array
 
@@ -126,13 +125,7 @@ class Rounded(WrappedForm):
             for k in range(len(T)):
                 out[k] = self._row(form, T[k], near, out[k], held)
 
-        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            if not form.one(params, T, value, near, out):
-                return False
-            out[:] = self._row(form, T, near, out, held)
-            return True
-
-        return WrappedKernels(form.params, one, many, self._kernels, form)
+        return BatchKernels.of_many(form.params, many)
 
     def _row(self, form: BatchKernels, T: Array, near: Array, q: Array, held: list[int]) -> Array:
         """All branches of one target from those of the family ``(k, n)``."""

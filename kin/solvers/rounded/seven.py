@@ -21,7 +21,7 @@ from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
 from kin.solvers.contract import APPROACH, POSE, BatchKernels, Candidates, ClosedForm, Completeness, SolverInput
-from kin.solvers.reversed import ReversedJoints, WrappedKernels
+from kin.solvers.reversed import ReversedJoints
 from kin.solvers.rounded.closed_form import Flags, Rounded
 from kin.solvers.rounded.ends import joined, move_ends
 from kin.solvers.rounded.rows import choose_rows, move_rows
@@ -372,13 +372,7 @@ class Rounded7(Rounded):
             form.many(form.params, T, values, near, out)
             move_rows(model, params, T, setting, values, out)
 
-        def one(_: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            if not form.one(form.params, T, value, near, out):
-                return False
-            move_rows(model, params, T[None], setting, np.array([value]), out[None])
-            return True
-
-        return WrappedKernels(form.params, one, many, self._kernels, form)
+        return BatchKernels.of_many(form.params, many)
 
 
 def _merged(rows: Array) -> Flags:

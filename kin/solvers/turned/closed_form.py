@@ -22,7 +22,6 @@ from kin.solvers.contract import (
     RedundancyParameter,
     SolverInput,
 )
-from kin.solvers.reversed import WrappedKernels
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.solvers.turned.last import LastJoint, last_joint
 from kin.tolerances import TOLERANCES
@@ -160,14 +159,7 @@ class Turned(ClosedForm):
             for k in range(len(T)):
                 out[k] = self._with_last(rows[k], T[k], POSE)
 
-        def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-            if not np.isfinite(T).all():
-                out[:] = math.nan
-                return False
-            many(params, T[None], np.array([value]), near, out[None])
-            return True
-
-        return WrappedKernels(inner.params, one, many, self._kernels, inner)
+        return BatchKernels.of_many(inner.params, many)
 
     def branch_of(self, q: Array) -> int:
         """The branch of a configuration, which the other joints decide."""

@@ -38,7 +38,6 @@ from kin.codegen.source import plain
 from kin.collision import nearest_links
 from kin.collision.contacts import surroundings
 from kin.collision.sweep import touches_along
-from kin.ik.candidates import unchecked
 from kin.ik.table import Table
 from kin.kernels import ahead
 from kin.kernels.compile import PLAIN
@@ -109,7 +108,6 @@ def moves(robot: Robot) -> None:
     q = robot.q_home.copy()
     for each in (fk, link_frames, jacobian, manipulability):
         each(robot, q)
-    unchecked()
     jacobian(robot, np.stack([q, q]))
     for task in ("pose", "approach"):
         _ = solve_ik(robot, fk(robot, q), task=task).redundancy  # made when it is read

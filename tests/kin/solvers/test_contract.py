@@ -202,10 +202,9 @@ def test_a_requested_value_is_kept(robot):
 
 
 @arms
-@pytest.mark.parametrize("checked", [True, False])
-def test_a_batch_is_bit_identical_to_single_targets(robot, checked):
+def test_a_batch_is_bit_identical_to_single_targets(robot):
     form = closed_form_of(robot)
-    kernels = form.kernels if checked else form.kernels.unchecked()
+    kernels = form.kernels
     params, near = kernels.params.copy(), robot.q_home.copy()
     T = np.concatenate([targets(robot, 40)[1], unreachable(targets(robot, 2)[1][1])[None]])
     shape = (len(form.branches), robot.n)
