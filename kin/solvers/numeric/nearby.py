@@ -19,9 +19,9 @@ from typing import TypeVar
 import numpy as np
 
 from kin.kernels.compile import inlined, jit
+from kin.kernels.dense import solve_positive
 from kin.solvers.contract import POSITION
 from kin.solvers.numeric.error import Goal, look, quadratic_model
-from kin.solvers.numeric.step import solve_free
 from kin.transforms import Array
 
 _DUAL, _HALVED, _BACK, _STEPS = 40, 6, 8, 60
@@ -48,13 +48,12 @@ def _linear(task: tuple[Array, Goal], q: Array, J: Array, e: Array) -> float:
     return math.sqrt(2.0 * error)
 
 
-@jit
+@inlined
 def _foot(J: Array, e: Array, q: Array, aim: Array, scale: Array, low: Array, high: Array, x: Array) -> None:
     """x ``(n,)`` ← the point nearest to `aim` inside [low, high] with J (x − q) = e; scale: 1/w² of the joints."""
     m, n = J.shape
     multipliers, left, move = np.zeros(m), np.empty(m), np.empty(m)
-    H, L, free = np.empty((m, m)), np.empty((m, m)), np.ones(m, dtype=np.bool_)
-    before, halved = math.inf, 0
+    H, before, halved = np.empty((m, m)), math.inf, 0
     for _ in range(_DUAL):
         for r in range(m):
             left[r] = e[r]
@@ -81,7 +80,9 @@ def _foot(J: Array, e: Array, q: Array, aim: Array, scale: Array, low: Array, hi
                 multipliers[r] -= move[r]
             continue
         before, halved = missed, 0
-        if not solve_free(H, left, free, _FLOOR * largest, L, move):
+        for r in range(m):
+            move[r] = left[r]
+        if not solve_positive(H, m, _FLOOR * largest, 0.0, move):
             break
         for r in range(m):
             multipliers[r] += move[r]

@@ -146,8 +146,8 @@ def _intervals(ends: list[tuple[float, int]], marks: list[float], seen: list[int
 
 def _nearest(rows: Array, preferred: float) -> Array:
     """Of each branch with an interval the value nearest to `preferred`."""
-    _, first = np.unique(rows[:, 0], return_index=True)
-    spans = pairwise([*first.tolist(), len(rows)])
+    names = rows[:, 0].tolist()
+    spans = pairwise([*map(names.index, dict.fromkeys(names)), len(names)])
     return np.array([nearest_in_arcs(rows, *span, preferred) for span in spans])
 
 
