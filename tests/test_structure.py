@@ -23,7 +23,7 @@ MAX_MODULE = 600  # lines of one idea; two ideas are two modules long before
 MAX_FUNCTION = 60  # lines, from `def` to the last one
 MAX_PARAMETERS = 9  # of a compiled function
 REASON = "Long because"  # begins the sentence of a docstring that says why a function or module is longer
-COMPILERS = {"jit", "brief", "inlined"}  # decorators of `kin.kernels.compile`
+COMPILERS = {"jit", "jit_with_gil", "inlined"}  # decorators of `kin.kernels.compile`
 BANNED = re.compile(
     r"\b(calm|dear|told|whoever|wish(?:es|ed)?|who (?:asks|wants|waits))\b"
     r"|\b(stands guard|the least offending|square to)\b",

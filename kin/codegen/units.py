@@ -24,7 +24,7 @@ from kin.codegen.source import decorators
 from kin.codegen.tree import Instance
 from kin.codegen.types import NONE, ArrayOf, Scalar, TupleOf, Type
 from kin.codegen.typing import Program
-from kin.kernels.compile import brief
+from kin.kernels.compile import jit_with_gil
 
 ENTRIES = Path(__file__).parent / "entries.txt"
 _TOKEN = re.compile(r"([\w.]*\()|([fibzws])(\d?)((?:\[[^\]]*\])?(?:\{[^}]*\})?)|\)")
@@ -163,7 +163,7 @@ def _prototype(entry: Entry, made: Instance, name: str, rooms: Rooms) -> Prototy
     )
     results = tuple(_values(made.result, (), frozenset()))
     blocks = 0 if room_of(made) is None else rooms.of_result(made)
-    keeps = brief.__name__ in decorators(made.function)
+    keeps = jit_with_gil.__name__ in decorators(made.function)
     return Prototype(entry, name, arguments, results, made.result, blocks, keeps)
 
 

@@ -15,6 +15,7 @@ from kin.ik.candidates import Flags as Flags
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
+from kin.solvers.canonical import merged
 from kin.solvers.contract import (
     APPROACH,
     Candidates,
@@ -230,13 +231,8 @@ def with_further(branches: Branches, together: tuple[Redundancy, ...]) -> tuple[
     if branches.further is None or not together:
         return together
     first = together[0]
-    joined: list[tuple[float, float]] = []
-    for low, high in sorted([*first.intervals, *map(tuple, branches.further().tolist())]):
-        if joined and low <= joined[-1][1] + TOLERANCES.merge:
-            joined[-1] = joined[-1][0], max(joined[-1][1], high)
-        else:
-            joined.append((low, high))
-    return (first._replace(intervals=tuple(joined)), *together[1:])
+    every = merged(((0, *ends) for ends in (*first.intervals, *branches.further().tolist())), TOLERANCES.merge)
+    return (first._replace(intervals=tuple((low, high) for _, low, high in every)), *together[1:])
 
 
 def _intervals(

@@ -60,7 +60,7 @@ def jit(function: _Kernel) -> _Kernel:
     return cast(_Kernel, Kernel(function))
 
 
-def brief(function: _Kernel) -> _Kernel:
+def jit_with_gil(function: _Kernel) -> _Kernel:
     """As `jit`, for a kernel of a fraction of a microsecond, which keeps the GIL.
 
     Releasing and taking it again costs 40 ns, a third of the kinematics of an arm, and more where another thread

@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from kin.kernels.compile import brief, inlined, jit
+from kin.kernels.compile import inlined, jit, jit_with_gil
 from kin.kernels.simd import WIDE, sin_cos
 from kin.transforms import Array
 
@@ -213,7 +213,7 @@ def fk_into(model: Array, q: Array, T: Array) -> None:
     apply_tool(model, (x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2), T)
 
 
-@brief
+@jit_with_gil
 def fk_one(model: Array, q: Array, T: Array) -> bool:
     """T ← T_base_tool ``(4, 4)`` of one configuration; False if q is not n finite numbers."""
     if q.shape[0] != int(model[1]):

@@ -17,6 +17,7 @@ The kernels of a seven-joint arm read it from one float64 array, and all its sig
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED
 from kin.solvers.contract import SolverInput
 from kin.transforms import Array
 
+Arc = tuple[float, float, float]  # branch, low, high
 BASE, TOOL, OFFSET, UPPER_ARM, FOREARM = 0, 12, 24, 31, 32
 
 
@@ -153,6 +155,17 @@ def turn_around(low: float, high: float, wanted: float) -> tuple[float, float]:
         start = min(max(wanted - math.pi, low), high - TURN)
         return start, start + TURN
     return wanted - math.pi, wanted + math.pi
+
+
+def merged(arcs: Iterable[Arc], slack: float) -> list[Arc]:
+    """Intervals (branch, low, high), sorted; those of a branch that overlap, or nearly touch, become one."""
+    found: list[Arc] = []
+    for branch, low, high in sorted(arcs):
+        if found and found[-1][0] == branch and low <= found[-1][2] + slack:
+            found[-1] = (branch, found[-1][1], max(found[-1][2], high))
+        else:
+            found.append((branch, low, high))
+    return found
 
 
 @jit

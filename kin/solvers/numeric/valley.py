@@ -1,4 +1,4 @@
-"""Descents that end a little beside their target are led on along the floor of their valley.
+"""Descents that end a little beside their target are continued along the weakly controllable directions.
 
 On an arm whose axes are nearly in a special position, by the rounding of its table for example, some motions of
 the joints move the tool by next to nothing: the *weak* directions. A target may need far motion along them, but a

@@ -59,7 +59,7 @@ def _rows_at(params: Array, T: Array, near: Array, chosen: Array, out: Array) ->
 
     NaN where a branch has none. near ``(7,)``: chain angles that decide what is free.
     """
-    rows, room, t, joints = np.empty((8, 7)), np.empty(8), near.copy(), np.empty((8, 7))
+    rows, margin, t, joints = np.empty((8, 7)), np.empty(8), near.copy(), np.empty((8, 7))
     last = math.nan
     for k in range(8):
         for i in range(7):
@@ -69,7 +69,7 @@ def _rows_at(params: Array, T: Array, near: Array, chosen: Array, out: Array) ->
         if chosen[k] != last:
             last = chosen[k]
             t[0] = params[SIGN] * last + params[OFFSET]
-            all_branches(params, T, near, t, -1, rows, room)
+            all_branches(params, T, near, t, -1, rows, margin)
             joints_of(params, rows, last, joints)
         for i in range(7):
             out[k, i] = joints[k, i]

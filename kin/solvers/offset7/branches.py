@@ -92,15 +92,15 @@ def two_roots(a: float, b: float, rest: float, slack: float, out: Array) -> floa
     if size < _SINGULAR:
         out[0] = out[1] = math.nan
         return 1.0 if abs(rest) <= slack else -1.0
-    room = size - abs(rest)
-    if slack < 0.0 and room < -slack:
-        return (room + slack) / size
-    if room < 0.0 and room >= -slack:
-        room = 0.0
+    margin = size - abs(rest)
+    if slack < 0.0 and margin < -slack:
+        return (margin + slack) / size
+    if margin < 0.0 and margin >= -slack:
+        margin = 0.0
     middle = math.atan2(b, a)
-    side = math.atan2(math.sqrt(max(room * (size + abs(rest)), 0.0)), rest)
+    side = math.atan2(math.sqrt(max(margin * (size + abs(rest)), 0.0)), rest)
     out[0], out[1] = middle + side, middle - side
-    return room / size
+    return margin / size
 
 
 @jit
@@ -123,11 +123,11 @@ def forearm(params: Array, t4: float) -> tuple[float, float, float]:
 
 
 @jit
-def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows: Array, room: Array) -> None:
+def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows: Array, margin: Array) -> None:
     """All branches with the first chain angle in t ``(7,)``, as chain angles; `near` ``(7,)`` decides what is
     free. With `only` ≥ 0 the row of that branch alone is written.
 
-    rows ``(8, 7)`` ← angles, NaN where the branch does not exist; room ``(8,)`` ← how far inside the arm's reach
+    rows ``(8, 7)`` ← angles, NaN where the branch does not exist; margin ``(8,)`` ← how far inside the arm's reach
     the branch is, as a share: negative where it does not exist, 0 where two branches merge.
     """
     p = params
@@ -140,7 +140,7 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows
     constant, a, b = distances(p)
     bent = two_roots(a, b, 0.5 * (square - constant), p[REACH] * math.sqrt(square), roots)
     for k in range(8):
-        room[k] = bent
+        margin[k] = bent
     if bent < 0.0:
         return
     for elbow in range(2):
@@ -150,7 +150,7 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows
         y0, y1, y2 = forearm(p, t[3])
         level = two_roots(p[SIN2] * y1, p[SIN2] * y0, wz - p[COS2] * y2, p[REACH], sides)
         for k in range(4):
-            room[4 * elbow + k] = min(bent, level) if level >= 0.0 else level
+            margin[4 * elbow + k] = min(bent, level) if level >= 0.0 else level
         if level < 0.0:
             continue
         for side in range(2):
@@ -241,7 +241,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     if not all_finite_pose(T):
         clear(out)
         return False
-    t, close, rows, room = np.empty(7), np.empty(7), np.empty((8, 7)), np.empty(8)
+    t, close, rows, margin = np.empty(7), np.empty(7), np.empty((8, 7)), np.empty(8)
     given = 6 if params[REVERSED] > 0.0 else 0
     if math.isnan(value):
         value = near[given]
@@ -249,7 +249,7 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
     for i in range(7):
         t[i] = close[i]
     t[0] = params[SIGN] * value + params[OFFSET]
-    all_branches(params, T, close, t, -1, rows, room)
+    all_branches(params, T, close, t, -1, rows, margin)
     joints_of(params, rows, value, out)
     return True
 

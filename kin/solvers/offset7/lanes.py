@@ -30,7 +30,7 @@ STRIDE = MOST + _WIDE
 # Offsets of the columns of lanes: value, sign of the elbow and of the side; then the slack of both branches, how
 # far inside the arm's reach they are, 1.0 where an angle is free, and the angles of joints 2, 3, 4, 5, 7 of the
 # first branch from the middles of their limits, and of joint 6 from 0.
-VALUE, ELBOW, SIDE, FIRST, SECOND, ROOM, MARK, ANGLES = range(0, 8 * STRIDE, STRIDE)
+VALUE, ELBOW, SIDE, FIRST, SECOND, MARGIN, MARK, ANGLES = range(0, 8 * STRIDE, STRIDE)
 JOINTS = 6
 SPACE = ANGLES + JOINTS * STRIDE
 # Layout of the setup of a target: the canonical pose; the chain's lengths and twists, and more of them with what
@@ -85,18 +85,18 @@ def _off(sine: float, cosine: float, m: Entries, i: int) -> float:
 @inlined
 def _root(rest: float, size: float, slack: float, sign: float) -> tuple[float, float, float]:
     """(share of the amplitude that `rest` is inside it with the slack, cos δ, ± sin δ), as in `two_roots`."""
-    room = size - abs(rest)
-    square = room * (size + abs(rest))
+    margin = size - abs(rest)
+    square = margin * (size + abs(rest))
     across = math.sqrt(square if square > 0.0 else 0.0)
     scale = 1.0 / math.sqrt(across * across + rest * rest + _TINY)
-    return (room + slack) / (size + _TINY), rest * scale, sign * across * scale
+    return (margin + slack) / (size + _TINY), rest * scale, sign * across * scale
 
 
 @inlined
 def _lane(
     value: float, elbow: float, side: float, n: Entries, p: Entries, d: Entries, m: Entries, h: Entries
 ) -> tuple[float, float, bool, Angles]:
-    """(room of the elbow, of the side, whether an angle is free, angles) of one lane; n, p, d, m, h: its setup."""
+    """(margin of the elbow, of the side, if an angle is free, angles) of one lane; n, p, d, m, h: its setup."""
     D1, A1, C1, S1, D2, C2, S2, A3, D3, C3, S3, X4 = p
     Y4, Z4, C4, S4, constant, size, along, beside, sign, offset, reach, _ = d
     s, c = sin_cos(sign * value + offset)
@@ -196,8 +196,8 @@ def lanes(params: Array, T: Array, box: Array, setup: Array, L: Array, count: in
         L[VALUE + b], L[ELBOW + b], L[SIDE + b] = L[VALUE], L[ELBOW], L[SIDE]
     for b in range(padded):
         bent, level, free, angles = _lane(L[VALUE + b], L[ELBOW + b], L[SIDE + b], n, p, d, m, h)
-        room = min(bent, level)
-        L[ROOM + b], L[MARK + b] = room, 1.0 if free & (room >= 0.0) else 0.0
+        margin = min(bent, level)
+        L[MARGIN + b], L[MARK + b] = margin, 1.0 if free & (margin >= 0.0) else 0.0
         L[FIRST + b], L[SECOND + b] = _least(insides(angles, False, h)), _least(insides(angles, True, h))
         a2, a3, a4, a5, a7, t6 = angles
         L[ANGLES + b], L[ANGLES + STRIDE + b], L[ANGLES + 2 * STRIDE + b] = a2, a3, a4
@@ -227,7 +227,7 @@ def slack_at(params: Array, T: Array, box: Array, setup: Array, value: float, k:
 
 
 @jit
-def room_at(setup: Array, value: float, elbow: float) -> float:
+def reach_margin(setup: Array, value: float, elbow: float) -> float:
     """How far inside the arm's reach the branches with an elbow (±1.0) are, as a share; negative if outside."""
     n, p, d, m, h = _read(setup)
     bent, level, _, _ = _lane(value, elbow, 1.0, n, p, d, m, h)  # the compiler leaves out the angles
@@ -235,29 +235,29 @@ def room_at(setup: Array, value: float, elbow: float) -> float:
 
 
 @jit
-def level_at(setup: Array, value: float, elbow: float) -> float:
-    """The part of the room that is due to the height of the wrist centre along axis 2."""
+def level_margin(setup: Array, value: float, elbow: float) -> float:
+    """The part of the margin that is due to the height of the wrist centre along axis 2."""
     n, p, d, m, h = _read(setup)
     return _lane(value, elbow, 1.0, n, p, d, m, h)[1]
 
 
 @jit
-def rooms(setup: Array, values: Array, elbow: float, room: Array, levels: Array) -> None:
-    """room, levels ``(n,)`` ← `room_at` and `level_at` each of the values ``(n,)``."""
+def reach_margins(setup: Array, values: Array, elbow: float, margin: Array, levels: Array) -> None:
+    """margin, levels ``(n,)`` ← `reach_margin` and `level_margin` each of the values ``(n,)``."""
     n, p, d, m, h = _read(setup)
     for i in range(values.shape[0]):
         bent, level, _, _ = _lane(values[i], elbow, 1.0, n, p, d, m, h)
-        room[i], levels[i] = min(bent, level), level
+        margin[i], levels[i] = min(bent, level), level
 
 
 @jit
 def _slack(params: Array, T: Array, value: float, box: Array, k: int) -> float:
     """The slack of branch k by `all_branches`, which takes angles that are free from the seed."""
-    rows, room, t = np.empty((8, 7)), np.empty(8), box[NEAR].copy()
+    rows, margin, t = np.empty((8, 7)), np.empty(8), box[NEAR].copy()
     t[0] = params[SIGN] * value + params[OFFSET]
-    all_branches(params, T, box[NEAR], t, k, rows, room)
-    if room[k] < 0.0:
-        return float(room[k])
+    all_branches(params, T, box[NEAR], t, k, rows, margin)
+    if margin[k] < 0.0:
+        return float(margin[k])
     least = math.inf
     for i in range(1, 7):
         half = 0.5 * (box[HIGH, i] - box[LOW, i])

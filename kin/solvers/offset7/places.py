@@ -1,6 +1,6 @@
 """Kernels for the values of the given joint at which branches are sampled, and for where branches exist.
 
-How far inside the arm's reach a branch is, its *room*, depends on the elbow alone and costs little.
+How far inside the arm's reach a branch is, its *reach margin*, depends on the elbow alone and costs little.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.solvers.offset7.branches import distances, seen, two_roots
 from kin.solvers.offset7.geometry import OFFSET, SIGN
-from kin.solvers.offset7.lanes import rooms
+from kin.solvers.offset7.lanes import reach_margins
 from kin.solvers.offset7.search import EITHER, LEVEL, Target, Whole, edge, peak, turns
 from kin.transforms import Array
 
@@ -20,7 +20,7 @@ SAMPLES = 96  # of a whole turn
 # How far from an end of the reach branches are looked at, and the most places where.
 _BESIDE = (1e-9, -1e-9, 1e-5, -1e-5, 1e-4, -1e-4, 1e-3, -1e-3, 4e-3, -4e-3, 0.015, -0.015)
 _MOST_ENDS = 64
-_MOST_TURNS = 64  # peaks and dips of the room
+_MOST_TURNS = 64  # peaks and dips of the margin
 # Places for all of these; if rounding makes up edges, the last ones have no places beside them.
 _RESERVED = 256
 # Shares of an interval between samples, from where a branch begins to exist.
@@ -43,7 +43,7 @@ def marks_of(params: Array, T: Array, span: tuple[float, float], wanted: float) 
 
 @jit
 def _insert(marks: Array, n: int, value: float) -> int:
-    """Insert a value into the n sorted marks, if it is not there and there is room; returns their number."""
+    """Insert a value into the n sorted marks, if it is not there and there is space; returns their number."""
     i = n
     while i > 0 and marks[i - 1] > value:
         i -= 1
@@ -84,30 +84,30 @@ def _insert_ends(params: Array, T: Array, span: tuple[float, float], marks: Arra
 
 @jit
 def places_of(target: Target, elbow: float, marks: Array, out: Array, coarse: Whole) -> int:
-    """out ``(2, m)`` ← values at which branches are sampled, and the room there; returns their number.
+    """out ``(2, m)`` ← values at which branches are sampled, and the margin there; returns their number.
 
     Those are the marks ``(n,)``, and values beside where the branches of the elbow begin to exist.
     coarse ``(n,)`` ← the places of the marks.
     """
     n = marks.shape[0]
-    every, room, level = np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS), np.empty(out.shape[1])
+    every, margin, level = np.empty(n + _MOST_TURNS), np.empty(n + _MOST_TURNS), np.empty(out.shape[1])
     for i in range(n):
         every[i] = marks[i]
-    rooms(target[3], marks, elbow, room, level)
+    reach_margins(target[3], marks, elbow, margin, level)
     count = _insert_turns(target, LEVEL, elbow, marks, level, every, n)
-    count = _insert_turns(target, EITHER, elbow, marks, room, every, count)
+    count = _insert_turns(target, EITHER, elbow, marks, margin, every, count)
     if count > n:
-        rooms(target[3], every[:count], elbow, room, level)
+        reach_margins(target[3], every[:count], elbow, margin, level)
     m = j = 0
     for i in range(count):
-        if i > 0 and (room[i - 1] >= 0.0) != (room[i] >= 0.0) and m < out.shape[1] - _RESERVED:
-            m = _append_edge(target[3], elbow, every[:count], room, i, out, m)
+        if i > 0 and (margin[i - 1] >= 0.0) != (margin[i] >= 0.0) and m < out.shape[1] - _RESERVED:
+            m = _append_edge(target[3], elbow, every[:count], margin, i, out, m)
         out[0, m] = every[i]
         if j < n and every[i] == marks[j]:
             coarse[j] = m
             j += 1
         m += 1
-    rooms(target[3], out[0, :m], elbow, out[1], level)
+    reach_margins(target[3], out[0, :m], elbow, out[1], level)
     return m
 
 
@@ -115,7 +115,7 @@ def places_of(target: Target, elbow: float, marks: Array, out: Array, coarse: Wh
 def _insert_turns(
     target: Target, what: int, elbow: float, marks: Array, f: Array, every: Array, count: int
 ) -> int:
-    """Insert the peaks and dips of f, `room_at` or `level_at` at the marks ``(n,)``, that pass zero between these.
+    """Insert the peaks and dips of f ``(n,)``, `reach_margin` or `level_margin` at the marks, that pass zero.
 
     every ``(≥ count,)``: the sorted marks, with those inserted before; returns the new count.
     """
@@ -131,12 +131,12 @@ def _insert_turns(
 
 
 @jit
-def _append_edge(setup: Array, elbow: float, values: Array, room: Array, i: int, out: Array, m: int) -> int:
+def _append_edge(setup: Array, elbow: float, values: Array, margin: Array, i: int, out: Array, m: int) -> int:
     """Append to the m values those of the edge between values i − 1 and i, and beside it; returns their number."""
-    opens = room[i] >= 0.0
+    opens = margin[i] >= 0.0
     a, b = (i, i - 1) if opens else (i - 1, i)
     c = min(max(2 * a - b, 0), values.shape[0] - 1)  # the value behind the one inside
-    x, y = edge(setup, elbow, (values[a], room[a], values[b], room[b], values[c], room[c]))
+    x, y = edge(setup, elbow, (values[a], margin[a], values[b], margin[b], values[c], margin[c]))
     count = len(_FROM_EDGE)
     for j in range(count):
         out[0, m + (j + 2 if opens else count - 1 - j)] = x + _FROM_EDGE[j] * (values[a] - x)

@@ -17,7 +17,7 @@ import numpy as np
 
 from kin.kernels.compile import inlined, jit
 from kin.kernels.simd import rounded
-from kin.solvers.offset7.lanes import ELBOW, FIRST, ROOM, SECOND, SETUP, SIDE, SPACE, VALUE, lanes, set_up
+from kin.solvers.offset7.lanes import ELBOW, FIRST, MARGIN, SECOND, SETUP, SIDE, SPACE, VALUE, lanes, set_up
 from kin.solvers.offset7.nearest import nearest_values
 from kin.solvers.offset7.places import marks_of, places_of
 from kin.solvers.offset7.samples import (
@@ -102,13 +102,13 @@ def _ends_of(
 ) -> int:
     """Append brackets of the ends of branch k's feasible intervals to the rows of `ends`; returns their number.
 
-    chain: values, rooms and slacks of n samples; look: scratch, ``(n,)`` each. Rows are appended in pairs.
+    chain: values, margins and slacks of n samples; look: scratch, ``(n,)`` each. Rows are appended in pairs.
     """
-    x, room, f = chain
+    x, margin, f = chain
     sense, crosses = look
     n = x.shape[0]
     turns(x, f, sense)
-    _where_to_look(room, f, sense, crosses)
+    _where_to_look(margin, f, sense, crosses)
     for i in range(n):
         if sense[i] == 0.0 and crosses[i] == 0.0 and 0 < i < n - 1:
             continue
@@ -127,19 +127,19 @@ def _ends_of(
         elif crosses[i] != 0.0:
             a, b = (i + 1, i) if f[i] < 0.0 else (i, i + 1)
             c = min(max(2 * a - b, 0), n - 1)  # the sample behind the one inside
-            third = (x[c], f[c]) if room[c] >= 0.0 else _NOWHERE
+            third = (x[c], f[c]) if margin[c] >= 0.0 else _NOWHERE
             found = _end(ends, found, k, (x[a], f[a]), (x[b], f[b]), third)
     return found
 
 
 @jit
-def _where_to_look(room: Array, f: Array, sense: Array, crosses: Array) -> None:
+def _where_to_look(margin: Array, f: Array, sense: Array, crosses: Array) -> None:
     """crosses ``(n,)`` ← 1.0 if f has a zero behind a sample; sense ``(n,)`` ← 0.0 if a branch ends beside it."""
     n = f.shape[0]
     for i in range(n - 1):
         crosses[i] = 1.0 if (f[i] >= 0.0) != (f[i + 1] >= 0.0) else 0.0
     for i in range(1, n - 1):
-        exists = (room[i - 1] >= 0.0) & (room[i] >= 0.0) & (room[i + 1] >= 0.0)
+        exists = (margin[i - 1] >= 0.0) & (margin[i] >= 0.0) & (margin[i + 1] >= 0.0)
         sense[i] = sense[i] if exists else 0.0
 
 
@@ -202,7 +202,7 @@ def _take(L: Array, n: int, Z: Array) -> None:
         k = Z[_BRANCH, i]
         half = 0.5 * k
         slack = L[FIRST + i] if half == rounded(half) else L[SECOND + i]
-        slack = L[ROOM + i] if L[ROOM + i] < 0.0 else slack
+        slack = L[MARGIN + i] if L[MARGIN + i] < 0.0 else slack
         bracket = (Z[_A, i], Z[_FA, i], Z[_B, i], Z[_FB, i], Z[_C, i], Z[_FC, i])
         Z[_A, i], Z[_FA, i], Z[_B, i], Z[_FB, i], Z[_C, i], Z[_FC, i] = narrowed(bracket, L[VALUE + i], slack)
 
@@ -224,11 +224,11 @@ def _joined(ends: Array, count: int, arcs: Array) -> int:
 
 
 @jit
-def _least_outside(slack: Array, room: Array, marks: Array, at: Whole) -> float:
+def _least_outside(slack: Array, margin: Array, marks: Array, at: Whole) -> float:
     """The mark at which a branch is least outside the limits, NaN if it exists at none."""
     best, value = -math.inf, math.nan
     for i in range(marks.shape[0]):
-        if room[at[i]] >= 0.0 and slack[at[i]] > best:
+        if margin[at[i]] >= 0.0 and slack[at[i]] > best:
             best, value = slack[at[i]], marks[i]
     return value
 

@@ -23,8 +23,8 @@ from kin.solvers.offset7.lanes import (
     ELBOW,
     FIRST,
     JOINTS,
+    MARGIN,
     MOST,
-    ROOM,
     SECOND,
     SIDE,
     SPACE,
@@ -50,10 +50,10 @@ PLACES = MOST // 2 - 2  # at most: both sides have to fit into the lanes
 _WHOSE = SPACE
 PASS_SPACE = SPACE + STRIDE
 _PARTS = 4  # of an interval in doubt
-# How far a joint may turn between samples where it may pass a limit, in each pass.
-_SWINGS = (0.0, 0.0, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05)
-# Scratch of a pass: the swing of each joint from sample to sample, how much an interval is in doubt (behind the
-# swings), and the most of those around a sample.
+# The maximum joint step between samples where a joint may pass a limit, in each pass.
+_LONGEST = (0.0, 0.0, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05)
+# Scratch of a pass: the step of each joint from sample to sample, how much an interval is in doubt (behind the
+# steps), and the most of those around a sample.
 _AROUND = 3
 _DOUBT, _MOST_DOUBT = JOINTS * STRIDE + _AROUND, (JOINTS + 1) * STRIDE
 DOUBT_SPACE = (JOINTS + 2) * STRIDE
@@ -66,7 +66,7 @@ def sample(
 ) -> None:  # fmt: skip
     """S ``(SAMPLES_SPACE,)`` ← samples of an elbow (±1.0), after ``(LENGTH,)`` ← which follows each, −1 at an end.
 
-    places ``(2, ≥ m)``: values and rooms, as from `places_of`. The first chain, of the positive side, begins at
+    places ``(2, ≥ m)``: values and margins, as from `places_of`. The first chain, of the positive side, begins at
     sample 0, the other at sample m. passes, fresh, D: scratch ``(PASS_SPACE,)``, ``(SPACE,)``, ``(DOUBT_SPACE,)``.
     """
     params, T, box, setup = target
@@ -78,7 +78,7 @@ def sample(
         if k >= 0:
             S[ONE + k], S[OTHER + k] = W[FIRST + i], W[SECOND + i]
     size = 2 * m
-    for least in _SWINGS:
+    for least in _LONGEST:
         _doubts(setup, W, n, D)
         n, more = _next_pass(least, W, n, D, S, after, size, V, fresh)
         if more == 0:
@@ -96,15 +96,15 @@ def _first_pass(elbow: float, places: Array, m: int, S: Array, after: Whole, W: 
     for side in range(2):
         runs = False
         for i in range(m):
-            k, room = side * m + i, places[1, i]
-            S[X + k], S[REACH + k], S[ONE + k], S[OTHER + k] = places[0, i], room, room, room
+            k, margin = side * m + i, places[1, i]
+            S[X + k], S[REACH + k], S[ONE + k], S[OTHER + k] = places[0, i], margin, margin, margin
             after[k] = k + 1
-            if room >= 0.0:
+            if margin >= 0.0:
                 W[VALUE + n], W[ELBOW + n], W[SIDE + n], W[_WHOSE + n] = places[0, i], elbow, 1.0 - 2.0 * side, k
                 n += 1
             elif runs:
                 n = _gap(W, n)
-            runs = room >= 0.0
+            runs = margin >= 0.0
         after[(side + 1) * m - 1] = -1
         if runs:
             n = _gap(W, n)
@@ -114,7 +114,7 @@ def _first_pass(elbow: float, places: Array, m: int, S: Array, after: Whole, W: 
 @inlined
 def _gap(W: Array, n: int) -> int:
     """Append a gap to the n entries of a pass; returns their number."""
-    W[VALUE + n], W[ELBOW + n], W[SIDE + n], W[ROOM + n], W[_WHOSE + n] = math.nan, 1.0, 1.0, -1.0, -1.0
+    W[VALUE + n], W[ELBOW + n], W[SIDE + n], W[MARGIN + n], W[_WHOSE + n] = math.nan, 1.0, 1.0, -1.0, -1.0
     return n + 1
 
 
@@ -126,21 +126,21 @@ def _angles(W: Array, i: int) -> Angles:
 
 
 @inlined
-def _doubt(here: Angles, there: Angles, swing: Angles, second: bool, h: Entries) -> float:
-    """The largest swing of a joint that may pass a limit between two samples; 0.0 if none may or one stays out."""
+def _doubt(here: Angles, there: Angles, moved: Angles, second: bool, h: Entries) -> float:
+    """The largest step of a joint that may pass a limit between two samples; 0.0 if none may or one stays out."""
     a, b = insides(here, second, h), insides(there, second, h)
     most, out = 0.0, False
     for j in range(JOINTS):
         near = min(abs(a[j]), abs(b[j]))
-        sure = near >= swing[j]
+        sure = near >= moved[j]
         out = out | (sure & (a[j] < 0.0) & (b[j] < 0.0))
-        most = most if sure else max(most, swing[j])
+        most = most if sure else max(most, moved[j])
     return 0.0 if out else most
 
 
 @inlined
 def _around(D: Array, j: int, i: int) -> float:
-    """The largest swing of joint j between entries i and i + 1 and the two intervals beside."""
+    """The largest step of joint j between entries i and i + 1 and the two intervals beside."""
     k = j * STRIDE + i
     return float(max(D[k], max(D[k + 1], D[k + 2])))
 
@@ -153,17 +153,17 @@ def _doubts(setup: Array, W: Array, n: int, D: Array) -> None:
     for j in range(JOINTS):
         a, d = ANGLES + j * STRIDE, j * STRIDE
         for i in range(n - 1):
-            exists = (W[ROOM + i] >= 0.0) & (W[ROOM + i + 1] >= 0.0)
+            exists = (W[MARGIN + i] >= 0.0) & (W[MARGIN + i + 1] >= 0.0)
             D[d + i + 1] = abs(wrapped(W[a + i + 1] - W[a + i])) if exists else 0.0
         D[d] = D[d + n] = 0.0
     for i in range(n - 1):
-        swing = (
+        moved = (
             _around(D, 0, i), _around(D, 1, i), _around(D, 2, i),
             _around(D, 3, i), _around(D, 4, i), _around(D, 5, i),
         )  # fmt: skip
         here, there = _angles(W, i), _angles(W, i + 1)
-        doubt = max(_doubt(here, there, swing, False, h), _doubt(here, there, swing, True, h))
-        exists = (W[ROOM + i] >= 0.0) & (W[ROOM + i + 1] >= 0.0)
+        doubt = max(_doubt(here, there, moved, False, h), _doubt(here, there, moved, True, h))
+        exists = (W[MARGIN + i] >= 0.0) & (W[MARGIN + i + 1] >= 0.0)
         D[_DOUBT + i] = doubt if exists else 0.0
     for i in range(_AROUND):
         D[_DOUBT - 1 - i] = D[_DOUBT + n - 1 + i] = 0.0
@@ -199,7 +199,7 @@ def _next_pass(
                 fresh[VALUE + more], fresh[ELBOW + more], fresh[SIDE + more] = value, W[ELBOW + i], W[SIDE + i]
                 S[X + whose], S[REACH + whose] = value, 0.0
                 V[VALUE + count], V[ELBOW + count], V[SIDE + count] = value, W[ELBOW + i], W[SIDE + i]
-                V[ROOM + count], V[_WHOSE + count] = 0.0, whose
+                V[MARGIN + count], V[_WHOSE + count] = 0.0, whose
                 after[k], k = whose, whose
                 count, more = count + 1, more + 1
             after[k] = last

@@ -1,4 +1,4 @@
-"""Kernels for zeros, peaks and dips between samples, of the slack of a branch or of the room of an elbow."""
+"""Kernels for zeros, peaks and dips between samples, of the slack of a branch or of the margin of an elbow."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import inlined, jit
-from kin.solvers.offset7.lanes import level_at, room_at, slack_at
+from kin.solvers.offset7.lanes import level_margin, reach_margin, slack_at
 from kin.transforms import Array
 
-LEVEL, EITHER = -1, -2  # instead of a branch: parts of the room of an elbow
+LEVEL, EITHER = -1, -2  # instead of a branch: parts of the margin of an elbow
 _GOLDEN = 0.6180339887498949
 _PEAK_STEPS = 24
 STEPS = 60  # at most, to find a zero
@@ -23,12 +23,12 @@ Bracket = tuple[float, float, float, float, float, float]
 
 @jit
 def _at(target: Target, value: float, k: int, elbow: float) -> float:
-    """The slack of branch k; `level_at` of an elbow if k is LEVEL, `room_at` if it is EITHER."""
+    """The slack of branch k; `level_margin` of an elbow if k is LEVEL, `reach_margin` if it is EITHER."""
     params, T, box, setup = target
     if k == EITHER:
-        return room_at(setup, value, elbow)
+        return reach_margin(setup, value, elbow)
     if k == LEVEL:
-        return level_at(setup, value, elbow)
+        return level_margin(setup, value, elbow)
     return slack_at(params, T, box, setup, value, k)
 
 
@@ -59,13 +59,13 @@ def narrowed(bracket: Bracket, value: float, f: float) -> Bracket:
 
 @jit
 def edge(setup: Array, elbow: float, bracket: Bracket) -> tuple[float, float]:
-    """Where the branches of an elbow begin to exist, in a bracket of `room_at`: neighbours on both sides of it."""
+    """Where the branches of an elbow begin to exist, in a bracket of `reach_margin`: neighbours on both sides."""
     x = bracket
     for _ in range(STEPS):
         if abs(x[2] - x[0]) < _EDGE_WIDTH:
             break
         value = next_in(x, _EDGE_WIDTH)
-        x = narrowed(x, value, room_at(setup, value, elbow))
+        x = narrowed(x, value, reach_margin(setup, value, elbow))
     return (x[0], x[2]) if x[1] >= 0.0 else (x[2], x[0])
 
 

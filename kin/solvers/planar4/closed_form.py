@@ -10,7 +10,7 @@ from kin.angles import TURN, wrap
 from kin.axes import frame_of, inverse, is_along, is_zero, lines_of, perpendicular_to
 from kin.fk import jacobian
 from kin.robot import Robot
-from kin.solvers.canonical import at_every_turn, turn_around
+from kin.solvers.canonical import at_every_turn, merged, turn_around
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -141,10 +141,4 @@ def _inside(arcs: Array, low: float, high: float) -> Array:
         for turn in range(math.ceil((low - slack - y) / TURN), math.floor((high + slack - x) / TURN) + 1):
             start, end = (min(max(value + TURN * turn, low), high) for value in (x, y))
             found.append((branch, start, end))
-    merged: list[tuple[float, float, float]] = []
-    for branch, x, y in sorted(found):
-        if merged and merged[-1][0] == branch and x <= merged[-1][2] + slack:
-            merged[-1] = (branch, merged[-1][1], max(merged[-1][2], y))
-        else:
-            merged.append((branch, x, y))
-    return np.array(merged).reshape(-1, 3)
+    return np.array(merged(found, slack)).reshape(-1, 3)

@@ -262,7 +262,7 @@ def test_the_example_has_the_branches_and_the_interval_of_the_exact_arm():
 
 @pytest.mark.parametrize("respect_limits", [True, False])
 def test_between_the_folds_of_the_two_tables_both_postures_at_a_value_are_found(respect_limits):
-    robot = typed(PANDA, 1.57)  # the exact arm's fold is at 0.50229, the typed table's at 0.502419
+    robot = typed(PANDA, 1.57)  # the exact arm's fold is at 0.50229, that of the table as entered at 0.502419
     T = kin.fk(robot, (-1.80932, -0.85776, -0.03083, -1.0881, 1.46089, 2.70858, -0.9246))
     folds = [i.redundancy[0].intervals[-1][1] for i in kin.solve_ik(robot, T).solutions if "back" in i.branch]
     assert folds[0] == pytest.approx(folds[1], abs=1e-9)
@@ -382,7 +382,7 @@ def test_a_followed_interval_belongs_to_the_branch_of_its_posture_that_is_clear_
         ("gen3 1.57", (-1.807653, 1.253057, -2.146223, -1.598254, -1.347517, 0.487404, 2.113698)),
         # Following a curve ended before it had come from outside the limits to its first interval.
         ("iiwa14 1.57", (2.464489, 0.713379, 1.144468, -1.408516, -2.825301, -1.819765, 2.837233)),
-        # At a fold of the typed table, the arm that was meant has no row at all.
+        # At a fold of the table as entered, the nominal arm has no row at all.
         ("xarm7-urdf 1.5708", (-5.798085, 0.856477, -0.54751, 3.505769, 4.212046, 0.168799, 5.952437)),
     ],
 )
@@ -398,7 +398,7 @@ def test_followed_curves_keep_every_interval(name, q):
 
 
 def test_a_branch_without_any_row_inside_the_limits_leaves_no_doubt():
-    """A Panda's elbow that would have to bend backwards: rows beyond the limits need not be on the typed table."""
+    """A Panda's elbow that would have to bend backwards: rows beyond the limits need not meet the target."""
     robot, exact = arm_named("panda 1.5708")
     for q in robot.random_q(np.random.default_rng(2), 100):
         T = kin.fk(robot, q)
@@ -456,7 +456,7 @@ def test_an_interval_has_gaps_that_the_nearby_exact_arm_hides(seed, target):
     ],
 )
 def test_every_value_of_a_listed_interval_is_found_when_it_is_asked_for(q):
-    """Also where the shoulder is nearly outstretched: a row there is far from that of the arm that was meant."""
+    """Also where the shoulder is nearly outstretched: a row there is far from that of the nominal arm."""
     judge = Judge("panda 1.57")
     T = kin.fk(judge.robot, np.array(q))
     found = kin.solve_ik(judge.robot, T)

@@ -136,7 +136,7 @@ def _wrong_sign(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str,
     """What the step on a mistake in the table is about."""
     row, typed, comparison = mistyped(robot)
     was = amount("alpha", -float(robot.rows[row].alpha), units)
-    verdict = messages.verdict(comparison, robot, typed, units, ("this arm", "the typed table"))
+    verdict = messages.verdict(comparison, robot, typed, units, ("this arm", "the table as entered"))
     return {"wrong_row": row + 1.0}, {"wrong": f"{symbol(robot, row, 'alpha')} = {was}", "verdict": verdict}
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from kin.angles import nearest_image
 from kin.kernels.compile import jit
+from kin.solvers.canonical import merged
 from kin.solvers.common import HIGH, LOW, NEAR, nearest_in_arcs
 from kin.solvers.wrist5.point.configuration import branch_at, fits, keep_best
 from kin.solvers.wrist5.point.constants import AMBIGUOUS, BRANCH, END, INSET, JOINT, RAD, SHEET, START, M
@@ -125,15 +126,8 @@ def _intervals(ends: list[tuple[float, int]], marks: list[float], seen: list[int
     ends: (θ4, branch), sorted; 8 is added to a branch of which a sign is a matter of rounding. marks: their
     distinct values. seen: between each two marks, the feasible branches, one bit each.
     """
-    rows: list[tuple[int, float, float]] = []
-    for branch in range(8):
-        bit = 1 << branch
-        for i, t4 in enumerate(marks[:-1]):
-            if seen[i] & bit:
-                if rows and rows[-1][0] == branch and rows[-1][2] == t4:
-                    rows[-1] = (branch, rows[-1][1], marks[i + 1])
-                else:
-                    rows.append((branch, t4, marks[i + 1]))
+    spans = [(mask, *span) for mask, span in zip(seen, pairwise(marks), strict=True)]
+    rows = merged([(b, low, high) for b in range(8) for mask, low, high in spans if mask >> b & 1], 0.0)
     for t4, name in ends:
         i = bisect_right(marks, t4) - 1
         around = [mask for mask in (seen[i - 1 : i] if i else []) + seen[i : i + 1] if mask]

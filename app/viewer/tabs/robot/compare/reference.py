@@ -120,8 +120,8 @@ def table_of(name: str, text: str, units: Units) -> dict[str, Any]:
     if len(lines) > MAX_ROWS:
         raise RobotFileError(name, "rows", f"{len(lines)} rows", f"at most {MAX_ROWS}")
     rows = [_row(name, i, cells, columns, units) for i, cells in enumerate(lines)]
-    about = {"name": "the typed table", "source": "a typed table", "units": {"length": "mm", "angle": "deg"}}
-    return {**about, "convention": convention, "rows": rows}
+    about = {"name": "the table as entered", "source": "a table as entered", "convention": convention}
+    return {**about, "units": {"length": "mm", "angle": "deg"}, "rows": rows}
 
 
 def _cells(line: str) -> list[str]:

@@ -131,7 +131,7 @@ def test_a_pasted_table_is_compared_and_kept_in_the_link(port: int) -> None:
     assert kin.compare(again.robot, PANDA).verdict == "identical"
     with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
         assert "Identical" in compared(tab)
-        assert "The other arm is the typed table" in part(tab, "compared")
+        assert "The other arm is the table as entered" in part(tab, "compared")
 
 
 @pytest.mark.full
