@@ -119,7 +119,33 @@ class Native:
     key: str = ""
 
 
-Node = Html | Folder | Control | Button | Buttons | Progress | Native
+@dataclass(slots=True, eq=False)
+class Docked:
+    """Nodes in a panel of their own to the left of the scene, of this width in pixels."""
+
+    label: str
+    children: Sequence[Node]
+    width: int
+    key: str = ""
+
+
+Node = Html | Folder | Control | Button | Buttons | Progress | Native | Docked
+
+
+class _DockedPanel:
+    """A panel to the left of the scene, and its tab, into which nodes go."""
+
+    def __init__(self, gui: viser.GuiApi, node: Docked, order: float) -> None:
+        self.order = order
+        self._panel = gui.add_panel()
+        self.tab = self._panel.add_tab(node.label)
+        self._panel.dock_left()
+        self._panel.set_width(node.width)
+        self._panel.expand()  # on a phone it would be collapsed at the end of the sheet
+
+    def remove(self) -> None:
+        """Close the panel."""
+        self._panel.remove()
 
 
 @dataclass(slots=True, eq=False)
@@ -222,7 +248,10 @@ class PanelView:
         self._live.clear()
 
     def _fill(
-        self, parent: viser.GuiFolderHandle, nodes: Sequence[Node], mounted: dict[Hashable, _Mounted]
+        self,
+        parent: viser.GuiFolderHandle | viser.GuiTabHandle,
+        nodes: Sequence[Node],
+        mounted: dict[Hashable, _Mounted],
     ) -> None:
         numbers: dict[type, int] = {}
         gone = set(mounted)
@@ -365,6 +394,8 @@ class PanelView:
                 one.handle = gui.add_progress_bar(value, order=order)
             case Native(build=build):
                 one.handle = build(order)
+            case Docked():
+                one.handle = _DockedPanel(gui, node, order)
         return one
 
     def _update(self, node: Node, one: _Mounted) -> None:
@@ -381,6 +412,8 @@ class PanelView:
                 one.props = props
         if isinstance(node, Folder):
             self._fill(one.handle, node.children, one.children)
+        elif isinstance(node, Docked):
+            self._fill(one.handle.tab, node.children, one.children)
         elif isinstance(node, Button):
             one.events = {"": node.event}
         elif isinstance(node, Buttons):

@@ -36,7 +36,7 @@ class Node:
 
     Attributes:
         drag: the event of a handle that is dragged; the method also gets each `DragEvent`.
-        click: the event of a click.
+        click: the event of a click; of batched meshes, the method also gets which one it was.
         keep: whether it is only hidden when it is not shown.
         once: whether its key is never used again once it is gone, so that nobody needs to remember its name.
     """
@@ -252,5 +252,6 @@ class SceneView:
 
     def _listen_click(self, node: Any, event: tuple[Hashable, ...]) -> None:
         @node.on_click  # type: ignore[untyped-decorator]
-        async def _(_: object) -> None:
-            self._post(("do", event, 0, 0), None)
+        async def _(click: Any) -> None:
+            index = () if click.instance_index is None else (click.instance_index,)
+            self._post(("do", (*event, *index), 0, 0), None)

@@ -171,12 +171,12 @@ class CloudView:
 
     # Progress
 
-    def advance(self, now: float, moving: bool) -> None:
-        """Send one part of the cloud that is behind; `moving`: frames of the arm have priority."""
+    def advance(self, now: float) -> None:
+        """Send one part of the cloud that is behind."""
         if not self.nodes:
             return
         ready = [nodes for nodes in self.nodes if nodes.ready]
-        if ready and self._may_send(now, moving):
+        if ready and self._may_send(now):
             self._sent = now
             try:
                 self._window.sent(min(ready, key=lambda nodes: nodes.points).step())
@@ -195,16 +195,16 @@ class CloudView:
         elif now - self._reported >= REPORT:
             self.report()
 
-    def next_tick(self, now: float, moving: bool) -> float | None:
+    def next_tick(self, now: float) -> float | None:
         """Seconds until `advance` should be called again."""
         if not self.nodes or not (self._running or self.busy):
             return None
         if not any(nodes.ready for nodes in self.nodes):
             return REST
-        return FRAME if self._may_send(now, moving) else min(REST, MOVING_INTERVAL)
+        return FRAME if self._may_send(now) else min(REST, MOVING_INTERVAL)
 
-    def _may_send(self, now: float, moving: bool) -> bool:
-        return self._window.is_open(moving) and (not moving or now - self._sent >= MOVING_INTERVAL)
+    def _may_send(self, now: float) -> bool:
+        return self._window.is_open and (not self._window.arm_moves or now - self._sent >= MOVING_INTERVAL)
 
     def report(self) -> None:
         """Update progress bar and line."""

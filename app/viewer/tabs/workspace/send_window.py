@@ -9,6 +9,7 @@ may be unconfirmed, fewer while the arm moves.
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 import viser
@@ -17,10 +18,11 @@ from app.viewer.panel.fence import wait_for_page
 
 WINDOW = 1 << 18  # unconfirmed points
 WHILE_MOVING = 1 << 16
+MOVED = 0.3  # s after its last frame, the arm still counts as moving
 
 
 class SendWindow:
-    """Counts sent and confirmed points. One thread calls `sent` and `is_open`.
+    """Counts sent and confirmed points. One thread calls everything here.
 
     Args:
         arrived: called from another thread whenever points were confirmed.
@@ -31,12 +33,23 @@ class SendWindow:
         self._notify = arrived
         self._sent = 0
         self._arrived = 0
+        self._moved = 0.0  # when the arm did last
         self._asking = False
         self._lock = threading.Lock()
 
-    def is_open(self, moving: bool) -> bool:
-        """Whether more points may be sent; `moving`: the arm is in motion, and its frames have priority."""
-        return self._sent - self._arrived < (WHILE_MOVING if moving else WINDOW)
+    def arm_moved(self) -> None:
+        """The scene shows the arm elsewhere."""
+        self._moved = time.perf_counter()
+
+    @property
+    def arm_moves(self) -> bool:
+        """Whether the arm is in motion: its frames have priority."""
+        return time.perf_counter() - self._moved < MOVED
+
+    @property
+    def is_open(self) -> bool:
+        """Whether more points may be sent."""
+        return self._sent - self._arrived < (WHILE_MOVING if self.arm_moves else WINDOW)
 
     def sent(self, points: int) -> None:
         """Count points that were just sent."""

@@ -6,13 +6,13 @@ the folder `capability`. Points come from the service's cache of clouds; what el
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
+from app.exports.svg import Plot
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Html, Node
@@ -29,9 +29,9 @@ from app.viewer.tabs.workspace.cut import Axis, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import Click, Clicks, search
 from app.viewer.tabs.workspace.postures.panel import Postures
-from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.said import Said
-from app.viewer.tabs.workspace.section.panel import SectionPanel, count, subscribe_section
+from app.viewer.tabs.workspace.section import panel as section
+from app.viewer.tabs.workspace.section.plot import Density, frame_of
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from kin.transforms import Array
@@ -39,19 +39,33 @@ from kin.units import grouped
 from kin.workspace import CapabilityMap
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
-DOT = 0.05  # s between two updates of the tool in the section plot
 FIGURE: dict[str, object] = {"n": 20_000, "strategy": "uniform", "by": "one", "axis": None, "axes": True}
-MOVED = 0.3  # s after its last frame, the arm still counts as moving
 
 
-class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
+class WorkspaceFacts(Facts[WorkspaceSettings]):
+    """What the tab knows of the section."""
+
+    @property
+    def frame(self) -> Plot | None:
+        """The axes of its plot; None: there is none yet, or nothing to plot."""
+        found: Plot | None = self.work("frame").value
+        return found
+
+    @property
+    def image(self) -> str:
+        """The cloud in the plot."""
+        density, image = self.work("image").value or (None, "")
+        return image if density is self.work("density").value else ""
+
+
+class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
     """Clouds of tool points, their sizes, their section, and the capability map."""
 
     key: ClassVar[str] = "workspace"
     title: ClassVar[str] = "Workspace"
     shared: ClassVar[bool] = True
     messages = frozenset({"map"})
-    settings_of, facts_of = WorkspaceSettings, Facts
+    settings_of, facts_of = WorkspaceSettings, WorkspaceFacts
 
     def __init__(self, stage: Stage) -> None:
         self._said = Said()
@@ -59,14 +73,12 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
 
     def built(self) -> None:
         stage = self.stage
-        window = SendWindow(stage.client, lambda: self.post("more"))
-        self._clouds = CloudView(stage, self._said, self.settings, window, lambda: self.post("more"))
+        self._window = SendWindow(stage.client, lambda: self.post("more"))
+        self._clouds = CloudView(stage, self._said, self.settings, self._window, lambda: self.post("more"))
         self._clicks = Clicks(stage.client.scene, self.post)
-        self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene)
-        self._moved = 0.0  # when the arm did last
         self._postures = self.adopt(Postures(stage, self))
-        self._capability = self.adopt(Capability(stage, self, window, self._moves, self._open_map))
+        self._capability = self.adopt(Capability(stage, self, self._window, self._open_map))
         self._capability.use_look(self.settings.map, None, None)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
@@ -92,11 +104,12 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             "Clear": self.event(self.on_clear),
         }
         others = tuple(other for other in self.stage.store.robots if other != robot)
-        return [
-            *nodes,
-            *cloud(s, self._said, actions),
-            *form(s, self._said, robot, others, unit, self._picked(), self._sizes()),
-        ]
+        nodes += cloud(s, self._said, actions)
+        nodes += form(s, self._said, robot, others, unit, self._picked(), self._sizes())
+        if s.section:
+            f, units = self.read, self.stage.units
+            nodes.append(section.panel(f.work("section"), f.frame, f.image, f.T[:3, 3], robot, units))
+        return nodes
 
     def _picked(self) -> Html:
         """The numbers of the clicked point, if there was a click."""
@@ -106,8 +119,10 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         return Html(views.picked, (found.value, self.stage.units), key="picked")
 
     def scene(self) -> Sequence[SceneNode]:
-        found, click = self.facts.work("pick").value, self.settings.click
-        return [] if found is None or click is None else [found.mark(click.size)]
+        facts = self.facts
+        found, click, signed = facts.work("pick").value, self.settings.click, facts.work("outline").value
+        nodes = [] if found is None or click is None else [found.mark(click.size)]
+        return nodes if signed is None else [*nodes, section.outline(signed, facts.T[:3, 3], facts.q)]
 
     def _sizes(self) -> Html:
         if not self.settings.sizes:
@@ -127,29 +142,27 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             ]
         if self.settings.click is not None:
             works.append(Work("pick", in_background(search), (stage.clouds, self.settings.click)))
-        if (plot := self._section) is not None:
-            works += [
-                Work("section", lambda arm, _: subscribe_section(stage.summaries, arm), (robot, plot)),
-                Work("outline", lambda arm, _: subscribe_section(stage.summaries, arm, True), (robot, plot)),
-                Work("dot", lambda tool, _: plot.tool_at(tool), (self.facts.T[:3, 3], plot), pace=DOT, keep=True),
-            ]
-            density = plot.density
-            for nodes in self._clouds.nodes[:1] if density is not None else ():
+        return [*works, *self._sections()] if self.settings.section else works
+
+    def _sections(self) -> Iterator[Work]:
+        """The section and its outline, and the cloud in its plot."""
+        facts, stage, subscribe = self.facts, self.stage, section.subscribe_section
+        yield Work("section", subscribe, (stage.summaries, facts.robot))
+        yield Work("outline", subscribe, (stage.summaries, facts.robot, True))
+        found = facts.work("section").value
+        if found is None or not found.curves:
+            return
+        yield Work("frame", frame_of, (found,))
+        for nodes in self._clouds.nodes[:1] if facts.frame is not None else ():
+            yield Work("density", lambda frame, _: Density(frame), (facts.frame, nodes.cloud))
+            if (density := facts.work("density").value) is not None:
                 counted = stage.clouds, nodes.cloud, nodes.parts, density
                 redraw = REDRAW if self._clouds.busy else 0.0
-                works.append(Work("plot", in_background(count), counted, pace=redraw, keep=True))
-        return works
+                yield Work("image", in_background(section.count), counted, pace=redraw, keep=True)
 
     def worked(self, key: str) -> None:
         super().worked(key)
-        found, section = self.facts.work(key).value, self._section
-        if section is not None and key == "section":
-            section.take(found, self.stage.now.T_tool[:3, 3])
-        elif section is not None and key == "outline":
-            section.take_outline(found, self.stage.now.T_tool[:3, 3])
-        elif section is not None and key == "plot" and found is not None:
-            section.show_cloud(*found)
-        elif key == "pick" and found is not None:
+        if key == "pick" and self.facts.work(key).value is not None:
             self.post(("do", self.event(self.on_picked), 0, 0))  # a step that can be undone
 
     # Events
@@ -169,9 +182,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         robot = self.stage.now.robot
         self._use(self.settings.for_robot(robot))
         self._set_cut()
-        if self._section is not None:
-            self._show_section(False)
-            self._show_section(True)
         self._show_axes()
         self.refresh()
         self.due = 0.0
@@ -182,28 +192,16 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self.due = 0.0
 
     def on_style(self) -> None:
-        units = self.stage.units
         self._show_axes()
         self._clouds.show_legend()
-        if self._section is not None:
-            self._section.use(units)
         super().on_style()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self._moved = time.perf_counter()
-        self._postures.on_pose(T_base_tool)
-        if self._section is not None:
-            self._section.turn(T_base_tool[:3, 3])
-        dues = self.due, None if self._section is None else DOT
-        self.due = min((due for due in dues if due is not None), default=None)
-
-    def _moves(self) -> bool:
-        """Whether the arm moves: its frames have priority."""
-        return time.perf_counter() - self._moved < MOVED
+        self._window.arm_moved()
+        super().on_pose(T_base_tool)
 
     def tick(self, now: float) -> None:
-        moves = self._moves()
-        self._clouds.advance(now, moves)
+        self._clouds.advance(now)
         self.schedule()
         try:
             super().tick(now)
@@ -212,7 +210,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
                 self._cut_as(None)
                 self.schedule()
             self._fit_view()
-            times = self.due, self._clouds.next_tick(now, moves)
+            times = self.due, self._clouds.next_tick(now)
             self.due = min((due for due in times if due is not None), default=None)
 
     def state(self) -> dict[str, object]:
@@ -234,8 +232,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             self._show_slabs()
         self._clouds.recolour()
         self._show_axes()
-        if before.section != self.settings.section:
-            self.changed("section")
         self._listen_clicks()
         if state.get("drawn") is True:
             self._start()
@@ -245,11 +241,9 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self.due = 0.0
 
     def remove(self) -> None:
-        self._capability.clear()
         super().remove()
         self._clear()
         self._axes.remove()
-        self._show_section(False)
 
     # Settings
 
@@ -280,8 +274,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
                 self._listen_clicks()
             case "axes":
                 self._show_axes()
-            case "section":
-                self._show_section(self.settings.section)
 
     def on_preset(self, number: int) -> None:
         """Take a common number of points."""
@@ -329,8 +321,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def _start(self) -> None:
         if self._clouds.start():
             self._use(replace(self.settings, click=None))
-            if self._section is not None:
-                self._section.drop_cloud()
         self._listen_clicks()
 
     def _clear(self) -> None:
@@ -338,8 +328,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._clouds.clear()
         self._use(replace(self.settings, click=None))
         self._listen_clicks()
-        if self._section is not None:
-            self._section.drop_cloud()
 
     def _listen_clicks(self) -> None:
         self._clicks.listen(bool(self._clouds.nodes) and self.settings.clicks)
@@ -402,12 +390,3 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         slabs = None if s.cut is None else s.cut.shown(s.at, s.keep)
         self._clouds.show(slabs)
         self._capability.use_look(s.map, s.cut, slabs)
-
-    # Section
-
-    def _show_section(self, visible: bool) -> None:
-        if self._section is not None:
-            self._section.remove()
-            self._section = None
-        if visible:
-            self._section = SectionPanel(self.stage, new_root())

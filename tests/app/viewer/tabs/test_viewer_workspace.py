@@ -11,7 +11,6 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,7 +30,7 @@ from app.viewer.panel.joints import UNLOCK_ALL
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import axes, colours, cut, pick, send_window, sizes, views
 from app.viewer.tabs.workspace.section import plot
-from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
+from app.viewer.tabs.workspace.section.panel import subscribe_section, turned
 from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
 from app.viewer.tabs.workspace.tab import Workspace
 from kin.robot import Joint
@@ -866,15 +865,10 @@ def test_section_and_sizes_appear_when_they_are_ready(tab):
 
 def test_the_outline_faces_as_joint_1_does_and_contains_the_tool():
     section = kin.workspace.workspace_section(PIONEER, resolution=8, signed=True)
-    panel = SectionPanel.__new__(SectionPanel)
-    panel._signed, panel._left = section, np.cross(section.v, section.u)
-    panel._outline, panel._angle = SimpleNamespace(wxyz=None), math.nan
     sides = set()
     for q in PIONEER.random_q(np.random.default_rng(5), 40):
-        panel._stage = SimpleNamespace(now=SimpleNamespace(q=q))
         tool = kin.fk(PIONEER, q)[:3, 3]
-        panel.turn(tool)
-        front = kin.transforms.rotation_from_wxyz(panel._outline.wxyz) @ section.u
+        front = kin.transforms.rotation_from_wxyz(turned(section, tool, float(q[0]))) @ section.u
         across = (tool - section.origin) * (1.0, 1.0, 0.0)
         assert np.linalg.norm(np.cross(front, across)) < 1e-9, "the tool is in the plane"
         assert front @ (math.cos(q[0]), math.sin(q[0]), 0.0) >= 0.0

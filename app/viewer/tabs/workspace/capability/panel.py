@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from app.shared.maps import MapRequest, MapTimeError
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
-from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node, Progress, same
+from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node, Progress
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Result, Work
 from app.viewer.feature import Feature, Stage
 from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.workspace.capability import views
-from app.viewer.tabs.workspace.capability.settings import Look, MapSettings
+from app.viewer.tabs.workspace.capability.settings import MapSettings
 from app.viewer.tabs.workspace.capability.voxels import Voxels, mark
 from app.viewer.tabs.workspace.cut import Cut
-from app.viewer.tabs.workspace.roots import new_root
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.views.templates import render
 from kin.workspace import CapabilityMap
@@ -78,7 +77,6 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
 
     Args:
         window: flow control, shared with the clouds.
-        moves: whether the arm moves: its frames have priority.
         appears: called with the first voxels of a map that the visitor has started, before they are drawn.
     """
 
@@ -91,11 +89,9 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         stage: Stage,
         tab: Feature,
         window: SendWindow,
-        moves: Callable[[], bool],
         appears: Callable[[CapabilityMap], None],
     ) -> None:
-        self._window, self._moves, self._appears = window, moves, appears
-        self._voxels: Voxels | None = None
+        self._window, self._appears = window, appears
         super().__init__(stage, tab)
 
     def panel(self) -> Sequence[Node]:
@@ -134,7 +130,9 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         ]
 
     def scene(self) -> Sequence[SceneNode]:
-        return [] if self.settings.picked is None else [mark(*self.settings.picked)]
+        s = self.settings
+        voxels = [] if s.drawn is None else [s.drawn.node(s.least, self.on_voxel.__name__)]
+        return voxels if s.picked is None else [*voxels, mark(*s.picked)]
 
     @property
     def extent(self) -> Sphere | None:
@@ -168,11 +166,13 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         try:
             super().tick(now)
         finally:
-            found, look = self.facts.found, self.settings.look
-            if found is not None and not self._is_drawn(found, look):
-                rested = self._voxels is None or now - self._voxels.since >= REDRAW
-                if rested and self._window.is_open(self._moves()):
-                    self._draw_map(found, look)
+            found, look, drawn = self.facts.found, self.settings.look, self.settings.drawn
+            if found is not None and (drawn is None or not drawn.shows(found, look)):
+                if self._window.is_open and (drawn is None or now - drawn.since >= REDRAW):
+                    voxels = Voxels(found, look)
+                    self.change(drawn=voxels)
+                    self._window.sent(COST * voxels.sent)
+                    self.schedule()
                 else:
                     self.due = min(POLL, POLL if self.due is None else self.due)
 
@@ -195,10 +195,7 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
     def clear(self) -> None:
         """Stop, and remove everything."""
         self._runner.end()
-        self.change(request=None, stopped=None, unseen=False, picked=None)
-        if self._voxels is not None:
-            self._voxels.remove()
-            self._voxels = None
+        self.change(request=None, stopped=None, unseen=False, drawn=None, picked=None)
         self.schedule()
 
     def use_look(self, colours: str, cut: Cut | None, shown: NDArray[np.bool_] | None) -> None:
@@ -212,44 +209,15 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
 
     def restore(self, state: dict[str, object]) -> None:
         super().restore(state)
-        self.changed("least")
         if state.get("drawn") is True:
             self.compute()
 
-    def changed(self, path: str) -> None:
-        if path == "least" and self._voxels is not None:
-            self._voxels.show(self.settings.least)
-
-    def started(self) -> None:
-        self.clear()
-
-    def on_voxel(self, root: str, level: int, instance: int) -> None:
+    def on_voxel(self, key: str, level: int, instance: int) -> None:
         """Mark the clicked voxel and show its numbers."""
-        voxels = self._voxels
-        row = voxels.voxel(level, instance) if voxels is not None and root == voxels.root else None
-        if voxels is None or row is None:
-            return  # redrawn since
-        self.change(picked=(voxels.found, row))
-
-    def _is_drawn(self, found: CapabilityMap, look: Look) -> bool:
-        voxels = self._voxels
-        return (
-            voxels is not None and voxels.found is found and same(vars(look).values(), vars(voxels.look).values())
-        )
-
-    def _draw_map(self, found: CapabilityMap, look: Look) -> None:
-        old, root = self._voxels, new_root()
-        self._voxels = Voxels(
-            self.stage.client.scene,
-            root,
-            found,
-            look,
-            self.settings.least,
-            lambda level, instance: self.post(("do", self.event(self.on_voxel, root, level, instance), 0, 0)),
-        )
-        if old is not None:
-            old.remove()
-        self._window.sent(COST * self._voxels.sent)
+        drawn = self.settings.drawn
+        row = drawn.voxel(level, instance) if drawn is not None and key == drawn.key else None
+        if drawn is not None and row is not None:  # not redrawn since
+            self.change(picked=(drawn.found, row))
 
 
 def _note(text: str) -> str:

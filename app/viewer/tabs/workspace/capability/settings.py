@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +10,15 @@ from numpy.typing import NDArray
 from app.shared.maps import MapRequest
 from app.viewer.declared.fields import Settings, choice, memory, number
 from app.viewer.declared.work import Result
+from app.viewer.tabs.workspace.capability.voxels import LEVELS, By, Look, Voxels
 from app.viewer.tabs.workspace.colours import MAPS
 from app.viewer.tabs.workspace.cut import Cut
 from kin import Robot
 from kin.workspace import CapabilityMap
 
-By = Literal["share", "manipulability"]
 SIZES = {"15 voxels long": 15, "25 voxels long": 25, "40 voxels long": 40}
 DIRECTIONS = {"12": 12, "24": 24, "48": 48, "96": 96}
 BY: dict[str, By] = {"Directions": "share", "Manipulability": "manipulability"}
-LEVELS = 25  # of the values, one node of the scene each
 
 
 def default_directions(robot: Robot) -> int:
@@ -45,16 +43,6 @@ LEAST_HINT = "Hides voxels below this share of the map's best value"
 
 
 @dataclass(frozen=True)
-class Look:
-    """How the map is drawn: quantity, colours, cut, and the visible slabs."""
-
-    by: By
-    map: str
-    cut: Cut | None = None
-    shown: NDArray[np.bool_] | None = None
-
-
-@dataclass(frozen=True)
 class MapSettings(Settings):
     """The settings of a map.
 
@@ -66,6 +54,7 @@ class MapSettings(Settings):
         request: the map that was started last.
         stopped: what it had come to when the visitor stopped it.
         unseen: whether the visitor has started it and has seen nothing of it.
+        drawn: what the scene shows of the map.
         picked: the map and the row of the clicked voxel.
     """
 
@@ -89,6 +78,7 @@ class MapSettings(Settings):
     request: MapRequest | None = memory()
     stopped: Result | None = memory()
     unseen: bool = memory(False)
+    drawn: Voxels | None = memory()
     picked: tuple[CapabilityMap, int] | None = memory()
 
     @property

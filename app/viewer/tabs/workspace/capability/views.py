@@ -9,8 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from app.viewer.tabs.workspace import colours
-from app.viewer.tabs.workspace.capability.settings import LEVELS, By
-from app.viewer.tabs.workspace.capability.voxels import first_level, largest, levels, values_of
+from app.viewer.tabs.workspace.capability.voxels import LEVELS, By, first_level, largest, levels, values_of
 from app.viewer.tabs.workspace.views import GAP, locks
 from app.viewer.views.templates import render
 from kin.ik.options import Locks
