@@ -109,9 +109,8 @@ class LessonChoice:
         elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
             with self._box:
-                about = arm_for(activity.text(chosen.key), self._stage.now.robot)
-                left = self._left.get((chosen.key, about.id))
-                self.guide = Guide(self._stage, chosen, left if steps is None else steps, after(chosen))
+                kept = self._kept(chosen.key) if steps is None else steps
+                self.guide = Guide(self._stage, chosen, kept, after(chosen))
                 self.shown = chosen(self._stage)
                 self.guide.attach(self.shown)
             activity.lesson = chosen.key
@@ -204,9 +203,18 @@ class LessonChoice:
         """Keep the progress in a lesson that is closed."""
         key = lesson, guide.arm.id
         self._left.pop(key, None)
-        self._left[key] = guide.state()
+        self._left[key] = {**guide.state(), "arm": guide.arm.id}
         while len(self._left) > KEPT:
             del self._left[next(iter(self._left))]
+
+    def _kept(self, lesson: str) -> dict[str, object] | None:
+        """The progress in a lesson about the arm on show, or about the last one if it does not ask about this."""
+        robot = self._stage.now.robot
+        asked = arm_for(self._stage.activity.text(lesson), robot) == robot
+        kept = [
+            state for (key, arm), state in self._left.items() if key == lesson and (arm == robot.id or not asked)
+        ]
+        return kept[-1] if kept else None
 
 
 def choices() -> tuple[type[Feature], ...]:

@@ -225,7 +225,7 @@ class _Maker:
 
     def elsewhere(self, text: StepText) -> Step:
         """A step that is asked about other arms."""
-        return Step(self.variant.text(text.title, self.units), "", arms=text.arms)
+        return Step(self.variant.text(text.title, self.units), "", arms=text.arms, at=text.at)
 
     def step(self, text: StepText) -> Step:
         asked, before = self.first(text.questions), self.first(text.estimate)
@@ -247,4 +247,5 @@ class _Maker:
             guessed=self.leads(before),
             answered=self.named(f"{text.at}answered", text.answered, self.facts.answered),
             arms=text.arms,
+            at=text.at,
         )

@@ -79,9 +79,10 @@ class ExampleView:
     def on_style(self, text: WorkedText | None) -> None:
         """The units have changed, or the words."""
         if text is not self._text:
+            self.close()  # another example may have fewer steps
             self._text, self._said = text, ()
             self._show_words()
-        if self._player is not None:
+        elif self._player is not None:
             self._player.use(self._example())
             self._show()
 

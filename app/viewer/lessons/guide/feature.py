@@ -219,8 +219,15 @@ class Guide(Feature):
         self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
         self._progress = self._arms.setdefault(robot, Progress(outline))
         self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
-        self._progress.use(outline)
+        self._use(outline)
         self._progress.at = outline.step_like(before, at)
+
+    def _use(self, outline: Outline) -> None:
+        """Go on with an outline; with one of another text, as far as the answers fit its questions."""
+        progress, before = self._progress, self._progress.outline.text
+        progress.use(outline)
+        if outline.text is not before:
+            progress.restore(progress.state())
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._example.on_pose()
@@ -229,7 +236,7 @@ class Guide(Feature):
         self.due = self._example.advance(now)
 
     def on_style(self) -> None:
-        self._progress.use(self._outline())
+        self._use(self._outline())
         text = self._progress.outline.text
         self._example.on_style(None if text is None else text.example)
         self._ask_earlier()
@@ -416,7 +423,8 @@ class Guide(Feature):
 
     def _show(self) -> None:
         here = self.is_asked
-        if here and self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
+        shown = self._shown if here and self.stage.now.robot == self.arm else None  # another arm has other steps
+        if shown is not None and (outline := shown.on_steps(self._progress)) is not None:
             self._progress.use(outline)
         progress, activity = self._progress, self.stage.activity
         withheld = progress.withheld if here else frozenset[str]()

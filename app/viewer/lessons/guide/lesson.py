@@ -88,7 +88,7 @@ class Lesson(Feature):
         """
         for robot in map(get_robot, text.every_arm):
             try:
-                for key, question in cls.outline(robot, DEFAULT_UNITS, text).questions():
+                for key, question in cls.asked(robot, DEFAULT_UNITS, text).questions():
                     if not question.judge(question.right()).right:
                         raise ValueError(f"the right answer to question {key} is not accepted")
             except ExerciseFileError:
@@ -110,13 +110,19 @@ class Lesson(Feature):
 
     @classmethod
     def completed(cls, found: Outline, robot: Robot, units: Units) -> Outline:
-        """An outline for this arm with the steps that are asked about others."""
+        """An outline for this arm with the steps that are asked about others.
+
+        Raises:
+            ValueError: the file leaves a step out for the arm that it is asked about.
+        """
         steps, others = list[Step](), dict[str, Outline]()
         for step in found.steps:
             if step.arms and robot.id not in step.arms:
                 arm = step.arms[0]
                 other = others[arm] = others.get(arm) or cls.outline(get_robot(arm), units, found.text)
-                there = next(each for each in other.steps if each.title == step.title)
+                there = next((each for each in other.steps if each.at == step.at), None)
+                if there is None:
+                    raise ValueError(f"{step.at}when leaves out the step “{step.title}” for its arm {arm}")
                 steps.append(replace(there, about=get_robot(arm), pose=there.pose or other.pose))
             else:
                 steps.append(step)

@@ -212,6 +212,7 @@ class Step:
         offer: what a button below the words does, by `Lesson.on_offer`, as its label; "": there is none.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
+        at: its place in the file, which it has for every arm.
     """
 
     title: str
@@ -230,6 +231,7 @@ class Step:
     arms: tuple[str, ...] = ()
     about: Robot | None = None
     offer: str = ""
+    at: str = ""
 
 
 @dataclass(frozen=True)

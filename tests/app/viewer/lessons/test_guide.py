@@ -19,6 +19,7 @@ from live_server import serve_viewer
 
 import kin
 from app.exercises.contract import Posed
+from app.exercises.lesson_text import LessonText
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -200,6 +201,28 @@ def test_any_state_can_be_restored(state: dict[str, object]) -> None:
 
 
 # The lessons
+
+
+def test_steps_about_other_arms_are_found_by_their_place_in_the_file() -> None:
+    class Turns(DHLesson):
+        titles = ("Turn", "Turn")
+
+        @classmethod
+        def outline(cls, robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
+            titles = cls.titles if robot.id == "puma560" else ("Turn", "Slide")
+            steps = (
+                Step(title, f"{i} of {robot.id}", arms=("puma560",), at=f"steps[{i}].")
+                for i, title in enumerate(titles)
+            )
+            return Outline("Turn.", tuple(steps), ())
+
+    assert [step.text for step in Turns.asked(kin.get_robot("ur5"), DEGREES).steps] == [
+        "0 of puma560",
+        "1 of puma560",
+    ]
+    Turns.titles = Turns.titles[:1]
+    with pytest.raises(ValueError, match=r"steps\[1\]\.when leaves out the step “Slide” for its arm puma560"):
+        Turns.asked(kin.get_robot("ur5"), DEGREES)
 
 
 def wrong_answers(question: Question) -> Iterator[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
+from kin.parsing import to_toml
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -82,3 +84,32 @@ def test_a_file_that_does_not_fit_the_arm_leaves_the_original(
         tab.wait(lambda: "the original is shown" in tab.html)
         assert "1. A column" in tab.html
     assert any("steps[0].question.value" in record.message for record in caplog.records)
+
+
+def test_of_a_file_that_is_edited_the_answers_stay_that_fit_its_questions(folder: Path, server: int) -> None:
+    data = tomllib.loads(lesson_files()["velocity"].read_text(encoding="utf-8"))
+    (folder / "velocity.toml").write_text(to_toml(data), encoding="utf-8")
+    with FakeBrowser(server) as tab:
+
+        def press(kind: str, *more: str, value: object = None) -> None:
+            tab.say("feature", ["guide", [kind, *more, len(tab.log)], value])
+            tab.settle()
+
+        tab.settle()
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        press("fields", "1", value=[["98765.4"]])
+        press("reveal", "5")
+        press("go", value=4)
+        press("watch", value=0)
+        for _ in data["example"]["steps"][1:]:
+            press("watch", value=1)
+        data["steps"][0]["question"] = next(one for one in data["check"] if one.get("kind") == "choice")
+        data["steps"], data["example"]["steps"] = data["steps"][:1], data["example"]["steps"][:3]
+        (folder / "velocity.toml").write_text(to_toml(data), encoding="utf-8")
+        tab.set("Radians", True)
+        tab.wait(lambda: f"0 of {len(data['check'])} right" in tab.html)
+        assert "Something went wrong" not in tab.html
+        assert "Watch a worked example" in tab.html
+        press("go", value=0)
+        assert 'data-question="1" data-closed="1"' not in tab.html

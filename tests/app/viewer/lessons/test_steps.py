@@ -105,9 +105,16 @@ def test_the_camera_follows_a_target_that_leaves_the_picture(server: int) -> Non
         tab.wait(lambda: distance() > 1.2 * before)
 
 
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
-def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any) -> None:
-    robot = arms_of(lesson.key)[-1]
+OPENED = [  # about the first arm in the quick tests
+    pytest.param(lesson, robot, id=f"{lesson.key}-{robot.id}", marks=() if robot == arms[0] else pytest.mark.full)
+    for lesson in LESSONS
+    for arms in [arms_of(lesson.key)]
+    for robot in arms
+]
+
+
+@pytest.mark.parametrize(("lesson", "robot"), OPENED)
+def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any, robot: Robot) -> None:
     outline = lesson.asked(robot, DEGREES)
     with FakeBrowser(server) as tab:
         tab.settle()
@@ -247,6 +254,20 @@ def test_answers_stay_with_the_arm_that_they_are_about(server: int) -> None:
         tab.choose(UR5.name)
         mark(tab, UR5, True)
         assert "data-asked" not in tab.html
+
+
+def test_a_lesson_goes_on_where_it_was_left_whatever_arm_is_on_show(server: int) -> None:
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        press(tab, ["go", 1], 1)
+        tab.wait(lambda: "2. Turning" in tab.html)
+        tab.set("Lesson", "None")
+        tab.choose(STORE.get("so101").name)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "2. Turning" in tab.html and is_at(tab, UR5, UR5.q_home))
 
 
 def test_a_wrong_angle_is_drawn_beside_the_arm(server: int) -> None:
