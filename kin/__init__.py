@@ -168,3 +168,6 @@ if not TYPE_CHECKING:
             return import_module(f"kin.{name}")
         found = globals()[name] = getattr(import_module(f"kin.{_LATER[name]}"), name)
         return found
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})

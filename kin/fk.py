@@ -32,7 +32,7 @@ _empty, _ndarray = np.empty, np.ndarray
 
 
 class _Compiled:
-    """Entry points of kernels that do not check their arguments, each loaded on first use."""
+    """Kernels without the call around them (`kin.kernels.compile.direct`), each loaded on first use."""
 
     @cached_property
     def fk_one(self) -> Callable[[Array, Array, Array], bool]:
@@ -139,7 +139,7 @@ def link_frames(robot: Robot | str, q: ArrayLike) -> Array:
         (6, 4, 4)
     """
     robot = robot_of(robot)
-    q = _writable(robot.check_q(q))
+    q = robot.check_q(q)
     frames = fk_kernels.frames_many(robot.model, q.reshape(-1, robot.n))
     return frames.reshape(*q.shape[:-1], len(robot.rows), 4, 4)
 
@@ -179,7 +179,7 @@ def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["world", "tool"] =
                 pass
     elif frame != "tool":
         raise InputError("frame", frame, 'one of "world", "tool"')
-    q = _writable(robot.check_q(q))
+    q = robot.check_q(q)
     J = jacobian_kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
     if frame == "tool":
         R_T = np.swapaxes(fk(robot, q)[..., :3, :3], -1, -2)
@@ -223,8 +223,3 @@ def _batch(robot: Robot, q: ArrayLike) -> Array:
     if is_plain(q) and q.shape[-1:] == robot.q_shape:
         return q
     return robot.check_q(q)
-
-
-def _writable(q: Array) -> Array:
-    """A writable array equal to q: kernels are compiled for writable arrays only, which halves compile time."""
-    return q if q.flags.writeable else q.copy()

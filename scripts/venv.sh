@@ -86,7 +86,7 @@ install_kinboard() {
   stamp="$root/.venv/installed$1"
   [ -x "$root/.venv/bin/python" ] || make_venv
   if [ ! -e "$stamp" ] || [ "$root/pyproject.toml" -nt "$stamp" ]; then
-    echo "Installing Kinboard into .venv and compiling its kernels (once: a minute, or some minutes where the network is slow)…"
+    echo "Installing Kinboard into .venv and compiling its kernels (once: half a minute, or some minutes where the network is slow)…"
     # Few of the modules that are installed are ever imported: each is compiled then, if that may be kept.
     pip_compile=--no-compile uv_compile=
     [ -z "${PYTHONDONTWRITEBYTECODE:-}" ] || pip_compile=--compile uv_compile=--compile-bytecode

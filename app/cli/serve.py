@@ -47,7 +47,7 @@ def run_mcp(arguments: Namespace) -> int:
         return 2
     try:
         from app.mcp.server import serve_stdio
-    except ImportError:
+    except ModuleNotFoundError:  # what kernels raise is none
         print("kinboard: this needs an extra: pip install 'kinboard[mcp]'", file=sys.stderr)
         return 2
     with no_collections():

@@ -151,7 +151,7 @@ def _writing(target: str, act: Callable[[], str]) -> int:
     except OSError as error:
         print(f"kinboard: cannot write {target}: {error.strerror or error}", file=sys.stderr)
         return 2
-    except ImportError as error:
+    except ModuleNotFoundError as error:  # what kernels raise is none
         print(f"kinboard: this needs {error.name}: pip install 'kinboard[hull]'", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

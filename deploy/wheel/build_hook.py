@@ -81,6 +81,8 @@ class WheelHook(BuildHookInterface):
             file = Path(self._run("python", "-m", BUILDER, str(Path(self._folder.name) / "kernels"), *options))
             build_data["force_include"][str(file)] = f"kin/{file.name}"
             platform = PLATFORMS[system][level.split("_")[0]] if level else platform
+            if sys.platform == "darwin" and not level:  # Python's own may be for both processors
+                platform = next(name for word, name in PLATFORMS["macos.11.0"].items() if f"_{word}" in file.name)
         build_data["pure_python"], build_data["tag"] = False, f"cp311-abi3-{platform}"
 
     def _run(self, kernels: str, *words: str) -> str:

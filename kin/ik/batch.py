@@ -255,7 +255,7 @@ def _seeds(robot: Robot, q_seed: ArrayLike, count: int) -> Array:
 
 
 class _Prepared(NamedTuple):
-    """What a call needs of an arm: its kernels without argument checks, and their constant arguments."""
+    """What a call needs of an arm: its kernels without the call around them, and their constant arguments."""
 
     one: One
     many: Many

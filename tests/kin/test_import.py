@@ -19,6 +19,7 @@ def there(*names):
 assert kin.solve_ik("ur5", kin.fk("ur5", [0.1] * 6)).solutions
 seldom = "calibration", "codegen", "comparison", "doctor", "escape", "motion", "motors", "notebook", "workspace"
 assert there(*seldom) == [], there(*seldom)
+assert set(kin.__all__) <= set(dir(kin))
 assert kin.plan_motion is kin.plan_motion is kin.motion.plan_motion
 assert "motion" in there(*seldom)
 """

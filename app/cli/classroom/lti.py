@@ -23,7 +23,7 @@ def run(arguments: Namespace) -> int:
     """Print the addresses; 2 if the file or the extra is missing or the file is invalid."""
     try:
         from app.classroom.lti.platforms import PlatformFileError, key_file, load_platforms, make_key
-    except ImportError:
+    except ModuleNotFoundError:
         print("kinboard: LTI needs an extra: pip install 'kinboard[lti]'", file=sys.stderr)
         return 2
     root = arguments.url.rstrip("/")

@@ -82,7 +82,7 @@ def check_platforms(settings: Settings) -> None:
         return
     try:
         from app.classroom.lti.platforms import PlatformFileError, load_platforms
-    except ImportError:
+    except ModuleNotFoundError:
         raise PlatformsRefused("KINBOARD_LTI needs an extra: pip install 'kinboard[lti]'") from None
     try:
         load_platforms(settings.lti)

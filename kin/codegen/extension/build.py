@@ -91,7 +91,7 @@ def compiler() -> tuple[list[str], str]:
         BuildError: there is none.
     """
     if importlib.util.find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"], f"ziglang {metadata.version('ziglang')}"
+        return [sys.executable, "-P", "-m", "ziglang", "cc"], f"ziglang {metadata.version('ziglang')}"
     if found := shutil.which("clang"):
         return [found], subprocess.run([found, "--version"], capture_output=True, text=True, check=True).stdout
     raise BuildError("kernels cannot be compiled: there is no clang; pip install ziglang, which brings one")
@@ -187,7 +187,7 @@ def _imports(folder: Path, module: str, level: str) -> list[str]:
     machine = "arm64" if level.startswith("aarch64") else "i386:x86-64"
     file, made = folder / "python3.def", folder / f"python3-{level}.lib"
     file.write_text("\n".join(["LIBRARY python3.dll", "EXPORTS", *imports_of(module), ""]), "utf-8")
-    _run([sys.executable, "-m", "ziglang", "dlltool", "-m", machine, "-d", str(file), "-l", str(made)])
+    _run([sys.executable, "-P", "-m", "ziglang", "dlltool", "-m", machine, "-d", str(file), "-l", str(made)])
     return [str(made)]
 
 
@@ -213,7 +213,7 @@ def prune(folder: Path) -> None:
     """Remove what is kept in a folder and was not used for `UNUSED` seconds."""
     for file in (*folder.glob("*.*"), *folder.glob("*/*.*")):
         if _OWN.fullmatch(file.relative_to(folder).as_posix()):
-            with contextlib.suppress(FileNotFoundError):  # another process has removed it
+            with contextlib.suppress(OSError):  # another process has removed it, or has it open
                 about = file.lstat()
                 if stat.S_ISREG(about.st_mode) and time.time() - about.st_mtime > UNUSED:
                     file.unlink()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -34,14 +35,17 @@ def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
     assert given[0].port == 0
 
 
-def test_a_service_whose_kernels_cannot_be_loaded_does_not_start_and_says_why(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_a_command_whose_kernels_cannot_be_loaded_does_not_start_and_says_why(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise ImportError("kernels cannot be compiled: there is no clang")
 
     monkeypatch.setattr("app.service.main.fk", fail)
     assert main(["serve", "--port", "0"]) == 2
+    assert capsys.readouterr().err == "kinboard: kernels cannot be compiled: there is no clang\n"
+    monkeypatch.setattr("app.cli.workspace.sample_workspace", fail)
+    assert main(["workspace", "ur5", "-o", str(tmp_path / "cloud.csv")]) == 2
     assert capsys.readouterr().err == "kinboard: kernels cannot be compiled: there is no clang\n"
 
 
