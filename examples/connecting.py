@@ -73,11 +73,6 @@ def main(
     return 0
 
 
-def said(robot: kin.Robot, joint: int, value: float) -> str:
-    """The size of a joint's motion in words: degrees, or millimetres."""
-    return f"{abs(value) * 57.29577951308232:.1f}°" if robot.revolute[joint] else f"{abs(value) * 1000.0:.1f} mm"
-
-
 def forced(robot: kin.Robot, joint: int, value: float) -> str:
     """The size of a joint's torque or force in words."""
     size = f"{abs(value):.0f}" if abs(value) >= 100.0 else f"{abs(value):.3g}"

@@ -8,10 +8,11 @@ from pathlib import Path
 from xml.sax.saxutils import escape
 
 import numpy as np
-from connecting import forced, said
+from connecting import forced
 from numpy.typing import NDArray
 
 import kin
+from kin.notebook.driving import said
 
 MOST = 60_000  # samples: ten minutes at 100 a second
 COLOURS = ("#1971c2", "#e8590c", "#2f9e44", "#9c36b5", "#c92a2a", "#0c8599", "#846358", "#5f3dc4")

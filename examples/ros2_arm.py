@@ -14,17 +14,17 @@ import math
 import sys
 import threading
 import time
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 import connecting
-import driving
 import numpy as np
 from numpy.typing import NDArray
 
 import kin
+from kin.notebook import driving
 
 try:
     import roslibpy
@@ -139,6 +139,34 @@ def joints_of(robot: kin.Robot, options: Namespace) -> list[str]:
     return names
 
 
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of driving."""
+    parser.add_argument(
+        "--drive", action="store_true", help="move the arm as the page does; without it, it is only read"
+    )
+    parser.add_argument(
+        "--speed",
+        type=connecting.positive,
+        default=driving.SLOW,
+        help=f"with --drive: deg/s of a joint, at most (default: {driving.SLOW:g}); "
+        f"joints that slide: {driving.SLOW_SLIDE:g} m/s",
+    )
+    parser.add_argument("--yes", action="store_true", help="do not ask before the arm is moved")
+
+
+def confirm(what: str, options: Namespace) -> None:
+    """Ask whether the arm may move; raises `driving.StoppedError` for any answer but yes."""
+    print(f"{what} will follow the page, at up to {options.speed:g} deg/s. Keep its power switch within reach.")
+    if options.yes:
+        return
+    try:
+        answer = input("Type yes to let it move: ")
+    except EOFError:
+        answer = ""
+    if answer.strip().lower() != "yes":
+        raise driving.StoppedError("not confirmed: the arm was not moved")
+
+
 def work(page: Any, options: Namespace) -> None:
     """Show where the arm is, and let it follow, until the connection to the page ends."""
     arm = Arm(options.rosbridge, options.joint_states, options.trajectory)
@@ -159,7 +187,7 @@ def work(page: Any, options: Namespace) -> None:
                 if heard > shown:
                     page.measured, shown = q, heard
                 if options.drive and not confirmed:
-                    driving.confirm(f"The arm behind {options.rosbridge}", options)
+                    confirm(f"The arm behind {options.rosbridge}", options)
                     confirmed = True
                     continue  # what was heard before the question is old
                 if options.drive:
@@ -204,7 +232,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--trajectory", default=TRAJECTORY, help=f"topic for JointTrajectory (default: {TRAJECTORY})"
     )
-    driving.add_options(parser)
+    add_options(parser)
     logging.getLogger("roslibpy").setLevel(logging.CRITICAL)  # its attempts to come back
     return connecting.main(parser, work, NAME, words)
 

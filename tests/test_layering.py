@@ -58,7 +58,7 @@ RULES: dict[str, set[str]] = {
     "kin/postures": {"numpy", "kin.ik", "kin.postures", "kin.solvers", "kin.workspace", *MODEL},
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},
     # It looks the service up by name when it is called.
-    "kin/notebook": {"numpy", "kin.collision", "kin.errors", "kin.motion", "kin.robot"},
+    "kin/notebook": {"numpy", "kin.collision", "kin.errors", "kin.motion", "kin.robot", "kin.transforms"},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},
     "app": {"app", "kin"},
     "app/shared": {
@@ -161,6 +161,7 @@ RULES: dict[str, set[str]] = {
     "app/service/web/agents.py": {
         *("fastapi", "mcp", "starlette", "app.api.body", "app.mcp", "app.service.web.hosts", "app.shared"),
     },
+    "app/servos": {"kin", "numpy", "scservo_sdk", "serial", "app.servos"},
     "app/notebook": {
         *("kin", "numpy", "app.classroom.tokens", "app.live.client", "app.notebook"),
         "app.viewer.session.state",
@@ -178,7 +179,7 @@ RULES: dict[str, set[str]] = {
         "app.exports",
         "app.shared",
     },
-    "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
+    "app/cli/parser.py": {"kin", "app.bench.command", "app.cli", "app.servos.command"},
     "app/cli/arguments/completion.py": {"kin", "shtab"},
     "app/cli/arguments": {"app.cli.arguments", "app.shared.options"},
     "app/cli/bodies.py": {"kin", "app.viewer.meshes"},
@@ -195,14 +196,14 @@ RULES: dict[str, set[str]] = {
         "kin",
         "numpy",
         "connecting",
-        "driving",
         "recording",
         "mujoco",
         "roslibpy",
-        "scservo_sdk",
-        "serial",
     },
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.mcp", "app.service.main", "app.shared"},
+    "app/servos/command.py": {
+        *("kin", "app.cli.terminal", "app.live", "app.notebook.process", "app.servos", "app.viewer.session.state"),
+    },
     "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }
 

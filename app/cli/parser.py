@@ -24,6 +24,7 @@ from app.cli.arguments.calibrate import add_calibrate
 from app.cli.arguments.postures import add_cuspidal, add_postures
 from app.cli.arguments.shared import Parents
 from app.cli.arguments.singularity import add_singularity
+from app.cli.arguments.so101 import add_so101
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import no_collections
 
@@ -187,6 +188,12 @@ def _load_serve() -> Run:
 
 def _load_open() -> Run:
     from app.cli.open import run
+
+    return run
+
+
+def _load_so101() -> Run:
+    from app.servos.command import run
 
     return run
 
@@ -357,6 +364,7 @@ def _load_lti() -> Run:
 COMMANDS = (
     Command("serve", declare.add_serve, _load_serve),
     Command("open", declare.add_open, _load_open),
+    Command("so101", add_so101, _load_so101),
     Command("mcp", add_mcp, _load_mcp),
     Command("fk", declare.add_fk, _load_fk),
     Command("ik", declare.add_ik, _load_ik),

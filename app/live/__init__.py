@@ -4,7 +4,19 @@
 with this code talk to the page, and :mod:`app.viewer.live` lets the page answer. Neither knows the other.
 """
 
-from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Line, Lines, Listener, Program, invite, reserved
+from app.live.line import (
+    EVENTS,
+    RESERVED,
+    VALUES,
+    BusyLineError,
+    Line,
+    Lines,
+    Listener,
+    Program,
+    expect,
+    invite,
+    reserved,
+)
 
 __all__ = [
     "EVENTS",
@@ -15,6 +27,7 @@ __all__ = [
     "Lines",
     "Listener",
     "Program",
+    "expect",
     "invite",
     "reserved",
 ]

@@ -48,9 +48,14 @@ def reserved(key: str) -> str:
 def invite() -> tuple[str, str]:
     """Reserve a code for one page of this process; returns the ticket for its address, and the code."""
     ticket, code = new_code() + new_code(), unused_code(RESERVED)
+    expect(ticket, code)
+    return ticket, code
+
+
+def expect(ticket: str, code: str) -> None:
+    """Reserve the ticket and the code of an invitation that another process has made, for one page of this one."""
     RESERVED.add(code)
     TICKETS[ticket] = code
-    return ticket, code
 
 
 class BusyLineError(Exception):

@@ -1,6 +1,7 @@
 """The process that serves a notebook: the service on a free port of this machine, moved by its standard input.
 
-Each line is JSON: ``key`` of the arm, ``path`` of configurations, ``seconds``. The process ends with its input.
+Each line is JSON: ``key`` of the arm, ``path`` of configurations and ``seconds``; or, for a page that will be
+opened, ``ticket`` and ``code``. The process ends with its input.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import threading
 from collections.abc import Iterable
 from typing import Any
 
-from app.live import RESERVED
+from app.live import RESERVED, expect
 from app.service.main import run
 from app.shared.settings import Settings
 from app.viewer.shown import SHOWN
@@ -26,6 +27,9 @@ def follow(lines: Iterable[str]) -> None:
     """Move arms as the lines say."""
     for line in lines:
         command = json.loads(line)
+        if "ticket" in command:
+            expect(command["ticket"], command["code"])
+            continue
         RESERVED.add(command["key"])  # the kernel may connect to the pages that show the arm
         SHOWN.play(command["key"], command["path"], command["seconds"])
 

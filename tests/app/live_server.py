@@ -6,6 +6,8 @@ import asyncio
 import socket
 import threading
 import time
+import urllib.error
+import urllib.request
 from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 
@@ -98,3 +100,12 @@ def wait_for(condition, seconds: float = 30.0) -> None:
     while not condition():
         assert time.monotonic() < deadline, f"the condition was not met within {seconds} s"
         time.sleep(0.01)
+
+
+def ready(address: str) -> bool:
+    """Whether the service at an address answers all it can."""
+    try:
+        with urllib.request.urlopen(f"{address}readyz", timeout=20) as answer:
+            return bool(answer.status == 200)
+    except urllib.error.HTTPError:  # it is still starting
+        return False

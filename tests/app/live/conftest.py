@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import driving
 import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
@@ -16,6 +15,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
+from kin.notebook import driving
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,7 @@
-"""A bus of Feetech's STS servos, for tests: the published packets, and what can spoil them.
+"""A bus of Feetech's STS servos, for tests: the simulated one with a record, and with what can spoil it.
 
-`FeetechBus` is on a pseudo-terminal and moves in real time; `Line` is in memory, and its servos move when the test
-says so.
-
-An instruction packet is ``FF FF id length instruction parameters checksum``. A status packet has an error byte in
-place of the instruction. The length counts what follows it, and the checksum is the complement of the sum from the
-id on (Feetech's *communication protocol user manual*, *memory table of the magnetic encoder STS servos*).
+`FeetechBus` is on a pseudo-terminal and moves in real time; `RecordedLine` is in memory, and its servos move when
+the test says so.
 """
 
 from __future__ import annotations
@@ -16,132 +12,34 @@ import pty
 import threading
 import time
 import tty
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 
-PING, READ, WRITE, SYNC_WRITE, SYNC_READ, EVERYBODY = 0x01, 0x02, 0x03, 0x83, 0x82, 0xFE
-MODEL, LEAST, MOST, OFFSET, TORQUE, GOAL, PRESENT = 3, 9, 11, 31, 40, 42, 56
-SPEED = 3000.0  # ticks/s of a servo on its way
-TURN = 4096  # ticks; the encoder begins again after them
+from app.servos.simulated import Line, packet
 
 
-def packet(number: int, *body: int) -> bytes:
-    """A packet of instruction or error and parameters."""
-    inside = bytes([number, len(body) + 1, *body])
-    return b"\xff\xff" + inside + bytes([~sum(inside) & 0xFF])
-
-
-@dataclass
-class Servo:
-    """Registers of a servo, which moves to its goal while its torque is on.
-
-    The goal is a tick of the turn that it reads, and it takes the way of their difference: from 4090 to 5 it goes
-    back nearly a whole turn.
-
-    Attributes:
-        position: ticks; beyond a turn, what it reads begins again.
-        error: of its status packets.
-        stuck: whether something holds it.
-        reversed: whether its motor turns it away from its goal.
-    """
-
-    position: float
-    memory: bytearray = field(default_factory=lambda: bytearray(128))
-    error: int = 0
-    stuck: bool = False
-    reversed: bool = False
-
-    def __post_init__(self) -> None:
-        self.put(MODEL, (777).to_bytes(2, "little"))
-
-    def put(self, address: int, values: bytes) -> None:
-        self.memory[address : address + len(values)] = values
-
-    def word(self, address: int) -> int:
-        return int.from_bytes(self.memory[address : address + 2], "little")
-
-    def advance(self, seconds: float) -> None:
-        if self.memory[TORQUE] and not self.stuck:
-            goal = self.word(GOAL)
-            if self.word(MOST):
-                goal = max(self.word(LEAST), min(self.word(MOST), goal))
-            way = goal - self.position % TURN
-            step = max(-SPEED * seconds, min(SPEED * seconds, way))
-            self.position += -step if self.reversed else step
-        self.put(PRESENT, (round(self.position) % TURN).to_bytes(2, "little"))
-
-    def calibrate(self, entry: Mapping[str, int]) -> None:
-        """Write what LeRobot's ``write_calibration`` writes to a servo."""
-        offset = entry["homing_offset"]
-        self.put(OFFSET, (abs(offset) | (offset < 0) << 11).to_bytes(2, "little"))  # sign and magnitude
-        self.put(LEAST, entry["range_min"].to_bytes(2, "little"))
-        self.put(MOST, entry["range_max"].to_bytes(2, "little"))
-
-
-class Line:
-    """Servos by their ids, and the packets between them and the program.
+class RecordedLine(Line):
+    """A simulated bus that says what was done to it.
 
     Attributes:
         broken: how many of the next answers are spoiled, each in the next of three ways.
-        missing: ids of servos that do not answer.
         written: instructions that change something: when, of which servo, at which address, which bytes.
-        refused: packets that no servo could read.
-        gone: whether a line in memory has been unplugged.
+        monotonic: the clock of `written`.
     """
 
     def __init__(self, positions: dict[int, float]) -> None:
-        self.servos = {number: Servo(position) for number, position in positions.items()}
+        super().__init__(positions)
         self.broken, self._spoiled = 0, 0
-        self.missing: set[int] = set()
         self.written: list[tuple[float, int, int, bytes]] = []
-        self.refused: list[bytes] = []
-        self.answers = b""
-        self.gone = False
         self.monotonic = time.monotonic
 
-    def advance(self, seconds: float) -> None:
-        """Let the servos move."""
-        for servo in self.servos.values():
-            servo.advance(seconds)
-
-    def take(self, buffer: bytes) -> bytes:
-        """Do what complete packets say; returns the rest."""
-        while (start := buffer.find(b"\xff\xff")) >= 0 and len(buffer) >= start + 4:
-            end = start + 4 + buffer[start + 3]
-            if len(buffer) < end:
-                return buffer[start:]
-            whole, buffer = buffer[start:end], buffer[end:]
-            if ~sum(whole[2:-1]) & 0xFF != whole[-1]:
-                self.refused.append(whole)
-            else:
-                self._do(whole[2], whole[4], whole[5:-1])
-        return buffer
-
-    def _do(self, number: int, instruction: int, given: bytes) -> None:
-        servo = self.servos.get(number)
-        if number == EVERYBODY and instruction == SYNC_WRITE:
-            address, length = given[0], given[1]
-            for k in range(2, len(given), length + 1):
-                self._write(given[k], address, given[k + 1 : k + 1 + length])
-        elif servo is None or number in self.missing:
-            return
-        elif instruction == PING:
-            self._answer(number)
-        elif instruction == READ:
-            self._answer(number, *servo.memory[given[0] : given[0] + given[1]])
-        elif instruction == WRITE:
-            self._write(number, given[0], given[1:])
-            self._answer(number)
-        else:
-            self.refused.append(bytes([number, instruction, *given]))
-
-    def _write(self, number: int, address: int, values: bytes) -> None:
+    def write(self, number: int, address: int, values: bytes) -> None:
+        super().write(number, address, values)
         if number in self.servos and number not in self.missing:
-            self.servos[number].put(address, values)
             self.written.append((self.monotonic(), number, address, values))
 
-    def _answer(self, number: int, *values: int) -> None:
-        answer = packet(number, self.servos[number].error, *values)
+    def answer(self, number: int, *values: int) -> None:
+        before = self.answers
+        super().answer(number, *values)
+        answer = self.answers[len(before) :]
         if self.broken:
             self.broken -= 1
             self._spoiled += 1
@@ -152,12 +50,12 @@ class Line:
                 answer = answer[:-2]  # cut
             else:
                 answer = packet(number, self.servos[number].error)  # complete, without the values
-        else:
-            answer = b"\x00\xff" + answer if self._spoiled % 2 else answer  # noise of the line before it
-        self.answers += answer
+        elif self._spoiled % 2:
+            answer = b"\x00\xff" + answer  # noise of the line before it
+        self.answers = before + answer
 
 
-class FeetechBus(Line):
+class FeetechBus(RecordedLine):
     """Servos on a pseudo-terminal.
 
     Attributes:

@@ -1,27 +1,31 @@
 """A driven arm, with a bus in memory and a clock that the test sets: LeRobot's calibrations, limits, stops.
 
-`test_so101_example.py` has the same program with a page of the viewer and a bus in real time.
+`test_so101.py` has the same session with a page of the viewer and a bus in real time.
 """
 
 from __future__ import annotations
 
 import json
-from argparse import Namespace
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
-import driving
 import numpy as np
 import pytest
 import serial
-import so101_arm
-from feetech_bus import GOAL, MODEL, TORQUE, TURN, Line
+from feetech_bus import RecordedLine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
+from app.servos import session
+from app.servos.bus import Bus
+from app.servos.calibration import Calibration
+from app.servos.scale import Scale
+from app.servos.simulated import GOAL, MODEL, TORQUE, TURN, VOLTAGE, Line, SimulatedPort
+from kin.notebook import driving
 
 ARM = kin.get_robot("so101")
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -68,34 +72,15 @@ class Clock:
         self.each(self.now - 100.0)
 
 
-class Serial:
-    """The serial port of a line, as pyserial has it."""
+class Port(SimulatedPort):
+    """A port that can be unplugged; the clock of the test moves the servos."""
 
-    def __init__(self, line: Line) -> None:
-        self._line = line
+    gone = False
 
-    @property
-    def in_waiting(self) -> int:
-        return len(self._line.answers)
-
-    def read(self, count: int) -> bytes:
-        found, self._line.answers = self._line.answers[:count], self._line.answers[count:]
-        return found
-
-    def write(self, data: bytes) -> int:
-        if self._line.gone:
+    def write(self, data: Any) -> int:
+        if self.gone:
             raise serial.SerialException("write failed: Input/output error")
-        assert self._line.take(bytes(data)) == b""
-        return len(data)
-
-    def reset_input_buffer(self) -> None:
-        self._line.answers = b""
-
-    def flush(self) -> None:
-        pass
-
-    def close(self) -> None:
-        pass
+        return super().write(data)
 
 
 class Page:
@@ -119,19 +104,22 @@ class Rig:
     Attributes:
         line: the bus.
         page: what the arm follows.
-        said: why the program has ended; empty: it has had its time.
+        said: why the session has ended; empty: it has had its time.
+        typed: what its owner types.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
         self._folder = folder
-        self.line = Line(dict(enumerate(map(float, START), 1)))
+        self.line = RecordedLine(dict(enumerate(map(float, START), 1)))
         self.line.advance(0.0)
         self.clock = Clock(self.line)
         self.line.monotonic = self.clock.monotonic
         self.page = Page(ARM)
         self.said = ""
-        monkeypatch.setattr(serial, "Serial", lambda **_: Serial(self.line))
-        for module in (so101_arm, driving):
+        self.typed: SimpleQueue[str] = SimpleQueue()
+        self.port = Port(self.line, monotonic=None)
+        monkeypatch.setattr(serial, "Serial", lambda **_: self.port)
+        for module in (session, driving):
             monkeypatch.setattr(module, "time", self.clock)
         monkeypatch.setattr(driving, "PAGE_LOST", 1e6)  # its signs of life come by another clock
 
@@ -140,23 +128,19 @@ class Rig:
         self.line.servos[number].position = ticks
         self.line.advance(0.0)
 
-    def drive(self, table: Any, seconds: float = 3.0, speed: float = 20.0, release: bool = False) -> Rig:
+    def drive(
+        self, table: Any, seconds: float = 3.0, speed: float = 20.0, release: bool = False, word: str = "enable"
+    ) -> Rig:
         file = self._folder / "arm.json"
         file.write_text(json.dumps(table))
         for entry in table.values():
             self.line.servos[entry["id"]].calibrate(entry)
-        options = Namespace(
-            port="/dev/ttyACM0",
-            calibration=file,
-            drive=True,
-            yes=True,
-            speed=speed,
-            release=release,
-            seconds=seconds,
-        )
         self.began = self.positions
+        self.typed.put(word)
         try:
-            so101_arm.work(self.page, options)
+            bus = Bus("/dev/ttyACM0")
+            calibrated = Calibration(str(file), bus.port).applied
+            session.Session(self.page, bus, calibrated, self.typed, speed, seconds).run(release)
         except kin.KinematicsError as error:
             self.said = str(error)
         return self
@@ -223,7 +207,7 @@ def test_a_wrist_that_can_turn_around_goes_where_the_page_says(rig, name, wrist,
     assert min(wrist, end) - 1 <= min(goals)
     assert max(goals) <= max(wrist, end) + 1, "straight there"
     steps = np.abs(np.diff(goals))
-    assert steps.max() <= 150.0 * so101_arm.CYCLE * 4095.0 / 360.0 + 1.5
+    assert steps.max() <= 150.0 * session.CYCLE * 4095.0 / 360.0 + 1.5
     assert rig.positions[:4] == rig.began[:4], "the other joints were not commanded"
 
 
@@ -271,7 +255,7 @@ def test_no_joint_is_led_beyond_its_calibrated_range_or_the_limits_of_the_page(r
     rng = np.random.default_rng(3)
 
     def move(t: float) -> None:
-        if round(t / so101_arm.CYCLE) % 100 == 0:  # long enough to rest at an end
+        if round(t / session.CYCLE) % 100 == 0:  # long enough to rest at an end
             rig.page.q = ARM.random_q(rng) * 3.0  # a page would not show this
 
     rig.clock.each = move
@@ -409,7 +393,7 @@ def test_a_servo_that_is_lost_stops_all_others(rig, capsys):
     ("missing", "words"),
     [
         ({3}, "motor 3 (elbow_flex) does not answer. motor 1 (shoulder_pan), motor 2 (shoulder_lift)"),
-        ({1, 2, 3, 4, 5}, "No servo answered: is the arm's power on?"),
+        (set(range(1, 7)), "No servo answered at /dev/ttyACM0: is the arm's power on, the cable"),
     ],
 )
 def test_a_missing_servo_is_named(rig, missing, words):
@@ -431,7 +415,7 @@ def test_an_overloaded_servo_stops_the_arm(rig):
         rig.line.servos[2].error = 1 << 5
 
     stops(rig, overload)
-    assert rig.said == "motor 2 (shoulder_lift) reports an error: load"
+    assert rig.said.startswith("motor 2 (shoulder_lift) reports an error: overload: take the load off")
     assert rests(rig, *range(1, 6))
 
 
@@ -449,16 +433,101 @@ def test_a_page_that_shows_another_arm_stops_this_one(rig):
 
 def test_a_bus_that_is_unplugged_ends_the_program(rig, capsys):
     def unplug() -> None:
-        rig.line.gone = True
+        rig.port.gone = True
 
     stops(rig, unplug)
     assert "the bus at /dev/ttyACM0 is gone" in rig.said
-    assert "the bus at /dev/ttyACM0 is gone" in capsys.readouterr().err, "and nothing can be told to the servos"
+    assert "the bus at /dev/ttyACM0 is gone" in capsys.readouterr().err, "and nothing reaches the servos"
 
 
 def test_motors_are_released_when_asked(rig):
     rig.drive(CALIBRATIONS["full turn"], release=True)
     assert not any(rig.torque)
+
+
+def test_nothing_is_written_before_the_owner_says_enable(rig, capsys):
+    for word in ("stop", "gripper 50", "go"):
+        rig.typed.put(word)
+    rig.clock.each = shoulder(60.0)(rig)
+    rig.drive(CALIBRATIONS["full turn"], word="")
+    assert rig.said == ""
+    assert rig.line.written == []
+    said = capsys.readouterr().out
+    assert "6 servos answer at /dev/ttyACM0: 7.4 V, 28 °C at most." in said
+    assert "The gripper moves after enable only." in said
+    assert "Got 'go'. Type and press Enter:" in said
+
+
+def test_stop_holds_the_arm_until_the_next_enable(rig):
+    """It goes on from where it is then, although the page shows another place meanwhile."""
+    begun = shoulder(80.0)(rig)
+    where: list[float] = []
+
+    def move(t: float) -> None:
+        begun(t) if t < 2.0 else None
+        if not where and t > 1.5:
+            rig.typed.put("stop")
+            where.append(t)
+        elif len(where) == 1 and t > 3.0:
+            where.append(rig.positions[0])
+            rig.place(1, where[1])
+            rig.typed.put("enable")
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"], seconds=5.0)
+    assert rig.said == ""
+    assert 5.0 < (where[1] - START[0]) * 360.0 / 4095.0 < 25.0
+    assert rig.positions[0] == pytest.approx(where[1], abs=1.0)
+    assert all(rig.torque)
+
+
+def test_the_gripper_goes_to_its_goal_slowly_and_squeezes_no_harder(rig, capsys):
+    low, high = RANGES[5]
+
+    def move(t: float) -> None:
+        if round(t / session.CYCLE) == 10:
+            assert not rig.line.servos[6].memory[TORQUE], "it has no goal yet"
+            rig.typed.put("gripper 90")
+        if t > 3.0 and rig.line.servos[6].position < high - 200:
+            rig.line.servos[6].stuck = True
+
+    rig.clock.each = move
+    for word in ("enable", "gripper 101", "gripper"):
+        rig.typed.put(word)
+    rig.drive(CALIBRATIONS["full turn"])
+    goals = rig.goals(6)
+    assert rig.said == ""
+    assert rig.line.servos[6].position == pytest.approx(low + 0.9 * (high - low), abs=1.0)
+    assert np.abs(np.diff([START[5], *goals])).max() <= 0.5 * (high - low) * session.CYCLE + 1.0
+    assert "gripper: got '101', expected a number from 0 (closed) to 100 (open)." in capsys.readouterr().out
+    rig.line.servos[6].stuck = True  # something is between its jaws
+    rig.clock.each = lambda _: None
+    rig.typed.put("enable")
+    here = rig.line.servos[6].position
+    rig.drive(CALIBRATIONS["full turn"], word="gripper 0")
+    assert min(rig.goals(6)[len(goals) :]) == pytest.approx(here - session.SQUEEZE, abs=1.0)
+    assert rig.goals(6)[-1] == pytest.approx(here, abs=1.0), "held where it is at the end"
+
+
+@pytest.mark.parametrize(
+    ("supply", "words"),
+    [
+        ((120, 28), "gets 12.0 V, expected 4.0 to 8.0 V: is this the arm's own power supply?"),
+        ((74, 71), "is at 71 °C, expected less than 70 °C: switch the arm's power off, and let it cool"),
+    ],
+)
+def test_a_servo_that_is_not_fit_to_move_is_named(rig, supply, words):
+    rig.line.servos[4].put(VOLTAGE, bytes(supply))
+    rig.drive(CALIBRATIONS["full turn"])
+    assert f"motor 4 (wrist_flex) {words}" in rig.said
+    assert rig.line.written == []
+
+
+def test_servos_of_another_baud_rate_are_found(rig):
+    rig.line.baud = 115_200
+    rig.drive(CALIBRATIONS["full turn"])
+    assert "motor 1 (shoulder_pan) talks at 115200 baud, expected 1000000. lerobot-setup-motors sets" in rig.said
+    assert rig.line.written == []
 
 
 # The guide of all programs that drive an arm
@@ -576,7 +645,7 @@ def arms(draw: st.DrawFn) -> tuple[kin.Robot, np.ndarray]:
 @given(arms())
 def test_ticks_and_joint_values_are_in_a_straight_line(drawn):
     robot, ticks = drawn
-    scale = so101_arm.Scale(robot, robot.motors, ticks)
+    scale = Scale(robot, robot.motors, ticks)
     q = scale.q(ticks)
     assert scale.ticks(q).tolist() == ticks.tolist(), "where it is, nothing moves"
     read = kin.motors.q_from_readings(robot, kin.motors.readings_from_ticks(robot.motors, ticks))

@@ -8,8 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-import urllib.error
-import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,7 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import LISTENING, wait_for
+from live_server import LISTENING, ready, wait_for
 
 import kin
 from app.cli import parser
@@ -143,14 +141,6 @@ def test_without_a_browser_the_address_of_the_page_is_printed(capsys, monkeypatc
     assert tried == ["http://127.0.0.1:1/viewer/?shown=T#s=S"]
     assert "connect to http://127.0.0.1:1/\n" in said
     assert f"open {tried[0]} yourself" in said
-
-
-def ready(address: str) -> bool:
-    try:
-        with urllib.request.urlopen(f"{address}readyz", timeout=20) as answer:
-            return bool(answer.status == 200)
-    except urllib.error.HTTPError:  # it is still starting
-        return False
 
 
 @pytest.mark.full

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-import driving
 import numpy as np
 import pytest
 import ros2_arm
@@ -14,6 +13,7 @@ from live_code import code_of
 from rosbridge import Rosbridge
 
 import kin
+from kin.notebook import driving
 
 UR5 = kin.get_robot("ur5")
 NAMES = [f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]

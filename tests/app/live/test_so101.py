@@ -1,4 +1,4 @@
-"""`examples/so101_arm.py` with a bus on a pseudo-terminal: mirror, drive, broken packets, what can be lost.
+"""`kinboard so101` with a bus on a pseudo-terminal: mirror, drive, broken packets, what can be lost.
 
 What stops a driven arm, and where it may go, is in `test_driving.py`, without waiting for time to pass.
 """
@@ -7,20 +7,33 @@ from __future__ import annotations
 
 import json
 import re
+import socket
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from queue import SimpleQueue
+from types import SimpleNamespace
+from urllib.parse import parse_qs, urlsplit
 
-import driving
 import numpy as np
 import pytest
-import so101_arm
 from example_run import ExampleRun
-from feetech_bus import GOAL, TORQUE, FeetechBus, packet
+from fake_browser import FakeBrowser
+from feetech_bus import FeetechBus
+from live_server import ready, wait_for
 
 import kin
+from app.cli.parser import main
 from app.live.client.connection import Connection
+from app.servos import command
+from app.servos.bus import Bus
+from app.servos.calibration import Calibration
+from app.servos.ports import BusError, find_port, port_problem
+from app.servos.simulated import GOAL, TORQUE, packet
+from kin.notebook import driving
 
+ROOT = Path(__file__).parents[3]
 ARM = kin.get_robot("so101")
 NAMES = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 RANGES = ((740, 3331), (880, 3280), (910, 3110), (930, 3240), (250, 3900), (2020, 3500))
@@ -53,15 +66,26 @@ def calibration(tmp_path) -> Path:
     return file
 
 
+def so101(words: Sequence[str]) -> int:
+    """The command, with the code of a page."""
+    return main(["so101", "--code", *words])
+
+
 @pytest.fixture
-def run(viewer, page, bus, calibration):
+def typed(monkeypatch) -> SimpleQueue[str]:
+    """What the owner types."""
+    lines: SimpleQueue[str] = SimpleQueue()
+    monkeypatch.setattr(command, "typed", lambda: lines)
+    return lines
+
+
+@pytest.fixture
+def run(viewer, page, bus, calibration, typed):
     runs = []
     page.choose(ARM.name)
 
     def started(*words) -> ExampleRun:
-        runs.append(
-            ExampleRun(so101_arm.main, viewer, page, ["--port", bus.port, "--calibration", calibration, *words])
-        )
+        runs.append(ExampleRun(so101, viewer, page, ["--port", bus.port, "--calibration", calibration, *words]))
         return runs[-1]
 
     yield started
@@ -98,7 +122,7 @@ def test_the_mirror_shows_the_encoders_and_writes_nothing(page, bus, run):
     bus.servos[2].position += 300.0
     page.wait(lambda: shows(page, bus))
     assert bus.written == []
-    assert bus.refused == []
+    assert bus.refused == 0
 
 
 @pytest.mark.full
@@ -147,8 +171,9 @@ def test_a_servo_that_comes_and_goes_hides_the_ghost(page, bus, run, capsys):
 
 
 @pytest.mark.full
-def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, patient, capsys):
-    started = run("--drive", "--yes", "--speed", SPEED)
+def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, typed, patient, capsys):
+    typed.put("enable")
+    started = run("--speed", SPEED)
     page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
     page.wait(lambda: page.shown.get("driven", "").startswith("SO-101 at /dev/pts"))
     page.wait(lambda: all(servo.memory[TORQUE] for i, servo in bus.servos.items() if i < 6))
@@ -175,14 +200,15 @@ def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, pati
     assert np.median(steps) < 2.0 * SPEED
     assert (goals[-1] - goals[0]) * TURN / (times[moving[-1] + 1] - times[moving[0]]) < 1.5 * SPEED
     assert abs(bus.servos[2].position - TICKS[1]) <= 2
-    assert bus.refused == []
+    assert bus.refused == 0
     started.end(page)
     assert all(servo.memory[TORQUE] for i, servo in bus.servos.items() if i < 6), "it would fall"
 
 
-def on_its_way(page, bus, run, capsys, *words):
+def on_its_way(page, bus, run, typed, capsys):
     """A run whose arm turns its base slowly."""
-    started = run("--drive", "--yes", "--speed", 10, *words)
+    typed.put("enable")
+    started = run("--speed", 10)
     page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
     page.set("1 shoulder pan", 60.0)
     page.wait(lambda: bus.servos[1].position - TICKS[0] > 30)
@@ -196,8 +222,8 @@ def rests(bus) -> bool:
 
 
 @pytest.mark.full
-def test_a_page_that_leaves_stops_the_arm(page, bus, run, patient, capsys):
-    started = on_its_way(page, bus, run, capsys)
+def test_a_page_that_leaves_stops_the_arm(page, bus, run, typed, patient, capsys):
+    started = on_its_way(page, bus, run, typed, capsys)
     started.end(page)
     assert started.codes == [1]
     assert rests(bus)
@@ -207,9 +233,9 @@ def test_a_page_that_leaves_stops_the_arm(page, bus, run, patient, capsys):
 
 
 @pytest.mark.full
-def test_a_page_that_is_silent_stops_the_arm(page, bus, run, patient, monkeypatch, capsys):
+def test_a_page_that_is_silent_stops_the_arm(page, bus, run, typed, patient, monkeypatch, capsys):
     """The connection stands, and nothing comes: the page is asked for signs of life."""
-    started = on_its_way(page, bus, run, capsys)
+    started = on_its_way(page, bus, run, typed, capsys)
     monkeypatch.setattr(driving, "PAGE_LOST", 0.5)
     monkeypatch.setattr(Connection, "_take", lambda *_: None)
     started.wait()
@@ -218,25 +244,16 @@ def test_a_page_that_is_silent_stops_the_arm(page, bus, run, patient, monkeypatc
 
 
 @pytest.mark.full
-def test_a_bus_that_is_unplugged_ends_the_program(page, bus, run, patient, capsys):
-    started = on_its_way(page, bus, run, capsys)
+def test_a_bus_that_is_unplugged_ends_the_program(page, bus, run, typed, patient, capsys):
+    started = on_its_way(page, bus, run, typed, capsys)
     bus.unplug()
     started.wait()
     assert started.codes == [1]
     assert f"the bus at {bus.port} is gone" in capsys.readouterr().err
 
 
-@pytest.mark.full
-def test_without_a_yes_nothing_is_written(page, bus, run, monkeypatch, capsys):
-    monkeypatch.setattr("builtins.input", lambda _: "y")
-    started = run("--drive")
-    started.wait()
-    assert started.codes == [1]
-    assert "not confirmed: the arm was not moved" in capsys.readouterr().err
-    assert bus.written == []
-
-
-def test_what_is_lacking_is_said(viewer, page, bus, tmp_path, capsys):
+def test_what_is_lacking_is_said(viewer, page, bus, typed, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path))
     page.choose(ARM.name)
     wrong = tmp_path / "wrong.json"
     wrong.write_text("{}")
@@ -245,7 +262,7 @@ def test_what_is_lacking_is_said(viewer, page, bus, tmp_path, capsys):
         (["--port", bus.port, "--calibration", wrong], "expected LeRobot's calibration"),
         (["--port", bus.port, "--calibration", tmp_path / "none.json"], "No such file or directory"),
     ):
-        started = ExampleRun(so101_arm.main, viewer, page, words)
+        started = ExampleRun(so101, viewer, page, words)
         started.wait()
         assert started.codes == [1]
         assert said in capsys.readouterr().err
@@ -254,9 +271,131 @@ def test_what_is_lacking_is_said(viewer, page, bus, tmp_path, capsys):
 
 
 def test_ports_that_cannot_be_opened_say_what_to_do():
-    with pytest.raises(so101_arm.BusError, match=r"there is no port /dev/ttyACM77\. Ports of this machine: "):
-        so101_arm.Bus("/dev/ttyACM77", [])
+    with pytest.raises(BusError, match=r"there is no port /dev/ttyACM77\. Ports of this machine:"):
+        Bus("/dev/ttyACM77")
     denied = PermissionError(13, "could not open port /dev/ttyACM0: Permission denied")
-    assert "sudo usermod -aG dialout $USER" in so101_arm.port_problem("/dev/ttyACM0", denied)
-    busy = OSError(16, "Device or resource busy")
-    assert "cannot be opened" in so101_arm.port_problem("/dev/ttyACM0", busy)
+    assert "sudo usermod -aG dialout $USER" in port_problem("/dev/ttyACM0", denied)
+    for busy in (OSError(16, "Device or resource busy"), OSError("could not open port 'COM3': Access is denied.")):
+        assert "is in use by another program: close it" in port_problem("/dev/ttyACM0", busy)
+
+
+def test_a_port_has_one_user(bus):
+    first = Bus(bus.port)
+    try:
+        with pytest.raises(BusError, match="is in use by another program"):
+            Bus(bus.port)
+    finally:
+        first.close()
+
+
+def test_the_port_is_the_only_one_on_usb(capsys):
+    def port(device: str, vid: int | None) -> SimpleNamespace:
+        return SimpleNamespace(device=device, description=f"the thing at {device}", vid=vid)
+
+    board, arm, other = port("/dev/ttyS0", None), port("/dev/ttyACM0", 0x1A86), port("/dev/ttyACM1", 0x1A86)
+    assert find_port(lambda: [board, arm]) == "/dev/ttyACM0"
+    assert "Serial port /dev/ttyACM0: the thing at /dev/ttyACM0." in capsys.readouterr().out
+    with pytest.raises(BusError, match=r"there is no serial port on USB: .*--port sim"):
+        find_port(lambda: [board])
+    both = r"(?s)say which with --port:.*  /dev/ttyACM0: the thing at /dev/ttyACM0.*  /dev/ttyACM1"
+    with pytest.raises(BusError, match=both):
+        find_port(lambda: [other, arm])
+
+
+def test_the_calibration_is_the_only_one_of_lerobots_folder(calibration, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path))
+    with pytest.raises(kin.KinematicsError, match=r"(?s)no calibrated range of .*lerobot-calibrate --robot"):
+        Calibration(None, "/dev/ttyACM0").applied(ARM)
+    folder = tmp_path / "robots" / "so101_follower"
+    folder.mkdir(parents=True)
+    (folder / "one.json").write_text(calibration.read_text())
+    found = Calibration(None, "/dev/ttyACM0").applied(ARM)
+    assert [motor.range for motor in found.motors] == list(RANGES)
+    assert "one.json" in capsys.readouterr().out
+    (folder / "two.json").write_text("{}")
+    with pytest.raises(kin.KinematicsError, match=r"(?s)which of these\?.*one\.json.*two\.json"):
+        Calibration(None, "/dev/ttyACM0")
+
+
+DOCUMENTED = re.findall(
+    r"^kinboard so101(.*)$", (ROOT / "docs/so101.md").read_text(encoding="utf-8"), re.MULTILINE
+)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("words", DOCUMENTED)
+def test_commands_of_the_page_run(viewer, page, bus, typed, calibration, tmp_path, monkeypatch, patient, words):
+    """With the bus of the test on the only port, and a page that is open in place of one that would be opened."""
+    page.choose(ARM.name)
+    folder = tmp_path / "robots" / "so101_follower"
+    folder.mkdir(parents=True)
+    (folder / "mine.json").write_text(calibration.read_text())
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path))
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    found = SimpleNamespace(device=bus.port, description="USB Single Serial", vid=0x1A86)
+    monkeypatch.setattr(find_port, "__defaults__", (lambda: [found],))
+    words = words.replace("/dev/ttyACM0", bus.port).replace("my_arm.json", str(calibration))
+    given = re.sub(r"--(code|address) \S+", "", words).split()
+    for word in ("enable", "gripper 40", "stop", "release", "quit"):
+        typed.put(word)
+    started = ExampleRun(so101, viewer, page, given)
+    started.wait()
+    assert started.codes == [0]
+    assert "--port sim" in words or not any(servo.memory[TORQUE] for servo in bus.servos.values())
+    page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
+    page.settle()
+
+
+@pytest.mark.full
+def test_the_page_of_the_command_has_a_process_of_its_own(typed, monkeypatch, patient, capsys):
+    """A lost browser stops the arm, and the service ends with the command."""
+    opened: list[FakeBrowser] = []
+
+    def show(url: str) -> bool:
+        parts = urlsplit(url)
+        memory = {"shown": parse_qs(parts.query)["shown"][0], "address": f"http://{parts.netloc}/"}
+        memory["state"] = parse_qs(parts.fragment)["s"][0]
+        wait_for(lambda: ready(memory["address"]), 120.0)
+        opened.append(FakeBrowser(f"ws://127.0.0.1:{parts.port}/viewer", memory=json.dumps(memory)))
+        typed.put("enable")
+        threading.Thread(target=leave, daemon=True).start()
+        return True
+
+    def leave() -> None:
+        page = opened[0]
+        page.wait(lambda: page.shown.get("driven", "").startswith("SO-101 at sim"))
+        page.close()
+
+    monkeypatch.setattr(command.webbrowser, "open", show)
+    assert main(["so101", "--port", "sim"]) == 1
+    said = capsys.readouterr()
+    assert "The arm holds its place" in said.out
+    assert re.search("closed|does not answer|No page", said.err), said.err
+    address = re.search(r"http://localhost:(\d+)/", said.out)
+    assert address is not None
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", int(address[1])), 5.0)
+
+
+@pytest.mark.full
+def test_the_simulated_arm_is_shown_and_driven(viewer, page, typed, patient, capsys):
+    page.choose(ARM.name)
+    typed.put("enable")
+    started = ExampleRun(so101, viewer, page, ["--port", "sim", "--speed", 60])
+    said = ""
+
+    def follows() -> bool:
+        nonlocal said
+        said += capsys.readouterr().out
+        return "The arm follows the page." in said
+
+    page.wait(follows)
+    assert "6 servos answer at sim: 7.4 V, 28 °C at most." in said
+    page.set("1 shoulder pan", 30.0)
+    page.wait(lambda: bool(measured(page)) and abs(measured(page)[0] - 30.0) < 0.2)
+    typed.put("quit")
+    started.wait()
+    assert started.codes == [0]
+    said += capsys.readouterr().out
+    assert "The arm holds its place" in said
+    page.settle()

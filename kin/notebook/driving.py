@@ -1,4 +1,4 @@
-"""What the programs that move a real arm share: a confirmation, limits on its motion, and reasons to stop.
+"""What programs that move a real arm share: limits on its motion, and reasons to stop.
 
 An arm stays where it was measured until the page commands it. Then each joint moves towards its command and never
 away from it, no faster than allowed, and no farther than the limits of the page's arm and of the real one.
@@ -8,17 +8,16 @@ None of it is a safety function: keep an emergency stop within reach.
 
 from __future__ import annotations
 
-import argparse
 import threading
 import time
 from typing import Any, Final
 
-import connecting
 import numpy as np
-from connecting import said
-from numpy.typing import NDArray
 
-import kin
+from kin.errors import KinematicsError
+from kin.motion import motion_limits
+from kin.robot import Robot
+from kin.transforms import Array
 
 BEAT: Final = 0.2  # s between two signs of life that the page is asked for
 PAGE_LOST: Final = 1.5  # s without one
@@ -31,40 +30,11 @@ AWAY: Final = np.radians(10.0)  # rad (for slides: m / 10) that a joint may move
 LATEST: Final = 0.1  # s that count at most between two steps: nothing is caught up after a pause
 LONGEST: Final = 60  # characters of the name of what is driven
 SAME: Final = 1e-3  # rad (m)
-SLOW, SLOW_SLIDE = 20.0, 0.05  # deg/s, m/s
-
-Array = NDArray[np.float64]
+SLOW, SLOW_SLIDE = 20.0, 0.05  # deg/s, m/s: unless the owner gives another
 
 
-class StoppedError(kin.KinematicsError):
+class StoppedError(KinematicsError):
     """The arm was not moved, or not any further; the message says why."""
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of driving."""
-    parser.add_argument(
-        "--drive", action="store_true", help="move the arm as the page does; without it, it is only read"
-    )
-    parser.add_argument(
-        "--speed",
-        type=connecting.positive,
-        default=SLOW,
-        help=f"with --drive: deg/s of a joint, at most (default: {SLOW:g}); joints that slide: {SLOW_SLIDE:g} m/s",
-    )
-    parser.add_argument("--yes", action="store_true", help="do not ask before the arm is moved")
-
-
-def confirm(what: str, options: argparse.Namespace) -> None:
-    """Ask whether the arm may move; raises `StoppedError` for any answer but yes."""
-    print(f"{what} will follow the page, at up to {options.speed:g} deg/s. Keep its power switch within reach.")
-    if options.yes:
-        return
-    try:
-        answer = input("Type yes to let it move: ")
-    except EOFError:
-        answer = ""
-    if answer.strip().lower() != "yes":
-        raise StoppedError("not confirmed: the arm was not moved")
 
 
 class Guide:
@@ -94,7 +64,7 @@ class Guide:
         self._page, self._what, self._robot = page, what[:LONGEST], page.robot
         self._limits = _common(self._robot, limits)
         wanted = np.where(self._robot.revolute, np.radians(speed), SLOW_SLIDE)
-        self._speed = np.minimum(wanted, kin.motion.motion_limits(self._robot).velocity)
+        self._speed = np.minimum(wanted, motion_limits(self._robot).velocity)
         self._size = np.where(self._robot.revolute, 1.0, 0.1)  # of what is far for a joint
         self.asked = measured.copy()
         self._moved, self._gap, self._away = (np.zeros(self._robot.n) for _ in range(3))
@@ -117,7 +87,7 @@ class Guide:
         while not self._over.wait(BEAT):
             try:
                 self._page.drives = self._what
-            except kin.KinematicsError:
+            except KinematicsError:
                 continue  # `step` notices the silence
             self._alive = time.monotonic()
 
@@ -182,7 +152,7 @@ class Guide:
         self._heart.join(PAGE_LOST)
 
 
-def _common(robot: kin.Robot, limits: tuple[Array, Array] | None) -> tuple[Array, Array]:
+def _common(robot: Robot, limits: tuple[Array, Array] | None) -> tuple[Array, Array]:
     """The limits of the page's arm and of the real one; raises `StoppedError` where nothing is inside both."""
     low, high = (robot.lower, robot.upper) if limits is None else limits
     both = np.maximum(low, robot.lower), np.minimum(high, robot.upper)
@@ -198,5 +168,10 @@ def _common(robot: kin.Robot, limits: tuple[Array, Array] | None) -> tuple[Array
     return both
 
 
-def _value(robot: kin.Robot, joint: int, value: float) -> str:
+def said(robot: Robot, joint: int, value: float) -> str:
+    """The size of a joint's motion in words: degrees, or millimetres."""
+    return f"{abs(value) * 57.29577951308232:.1f}°" if robot.revolute[joint] else f"{abs(value) * 1000.0:.1f} mm"
+
+
+def _value(robot: Robot, joint: int, value: float) -> str:
     return f"{'−' if value < 0 else ''}{said(robot, joint, value)}"
