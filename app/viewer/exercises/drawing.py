@@ -8,10 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import viser
 
-from app.viewer.declared.scene import Node, SceneView, label
-from app.viewer.panel import Post
+from app.viewer.declared.scene import Node, label
 from app.viewer.skeleton import ghost
 from kin import Robot, fk, wxyz_from_rotation
 from kin.transforms import Array
@@ -40,24 +38,6 @@ def mistaken_arm(robot: Robot, q: Array) -> Sequence[Node]:
     """A copy of an arm at q ``(n,)``, for which a wrong answer is right."""
     words = label("words", "the arm of your answer", fk(robot, q)[:3, 3], anchor=None)
     return [replace(node, keep=False) for node in (ghost("arm", robot, q, _COLOR, OPACITY), words)]
-
-
-class Drawing:
-    """The frame that the visitor drags, in a scene of its own; `post` gets ``("drag", GHOST, number)``."""
-
-    def __init__(self, scene: viser.SceneApi, post: Post) -> None:
-        self._view = SceneView(scene, "exercise", post)
-        self.has_ghost = False
-
-    def clear(self) -> None:
-        """Remove it."""
-        self.has_ghost = False
-        self._view.remove()
-
-    def ghost(self, T: Array, reach: float) -> None:
-        """Show it at a pose ``(4, 4)``."""
-        self.has_ghost = True
-        self._view.show([own_frame(T, reach)])
 
 
 def _frame(key: str, T: Array, size: float, words: str, above: float) -> Node:

@@ -23,6 +23,7 @@ from app.viewer.exercises import drawing, views
 from app.viewer.exercises.drawing import SIZE
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Stage
+from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from app.viewer.scene.gizmo import DragEvent
@@ -129,8 +130,8 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
             nodes.append(drawing.own_frame(s.sheet.ghost, reach))
         return [*nodes, *(() if s.mistaken is None else drawing.mistaken_arm(*s.mistaken))]
 
-    def _joints(self, order: float) -> _Joints:
-        return _Joints(self.stage, order)
+    def _joints(self, order: float) -> JointSliders:
+        return JointSliders(self.stage, order)
 
     # Events
 
@@ -340,13 +341,16 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         self._fit_view(exercise)
 
 
-class _Joints:
-    """The joint sliders once more, where the arm is the answer."""
+class JointSliders:
+    """The joint sliders once more, where the arm is the answer; with `buttons`, its named configurations too."""
 
-    def __init__(self, stage: Stage, order: float) -> None:
+    def __init__(self, stage: Stage, order: float, buttons: bool = False) -> None:
         self._stage = stage
         self._folder: viser.GuiFolderHandle = stage.client.gui.add_folder("Joints of the arm", order=order)
         stage.show_joints(self._folder)
+        if buttons:
+            with self._folder:
+                go_to_buttons(stage.client.gui, stage.post)
 
     def remove(self) -> None:
         """Remove them."""

@@ -111,8 +111,7 @@ class LessonChoice:
             with self._box:
                 kept = self._kept(chosen.key) if steps is None else steps
                 self.guide = Guide(self._stage, chosen, kept, after(chosen))
-                self.shown = chosen(self._stage)
-                self.guide.attach(self.shown)
+                self.shown = self.guide.shown
             activity.lesson = chosen.key
         else:
             activity.lesson = chosen.key
@@ -191,6 +190,7 @@ class LessonChoice:
             self.shown.remove()
         if self.guide is not None:
             self.guide.remove()
+        self._stage.activity.asked = frozenset()
         self.shown = self.guide = None
         if self._box is not None:
             self._box.remove()

@@ -7,6 +7,7 @@ drawn beside them, and shows it again at the end.
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +16,7 @@ from app.viewer.declared.scene import SceneView
 from app.viewer.feature import Stage
 from app.viewer.lessons.guide.example import Example, Player, example_of
 from app.viewer.lessons.guide.example_drawing import ExampleDrawing, View
-from app.viewer.panel import update_html
-from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
-from app.viewer.views.templates import render
 from kin import InputError
 from kin.transforms import Array
 
@@ -28,7 +26,7 @@ PLAY, NEXT, BACK = 0, 1, -1  # what the buttons send
 
 
 class ExampleView:
-    """The example of one lesson. Its control is made in the container that is open.
+    """The example of one lesson.
 
     Args:
         text: None: the lesson has none, and there is nothing to see.
@@ -37,17 +35,25 @@ class ExampleView:
     def __init__(self, stage: Stage, text: WorkedText | None) -> None:
         self._stage, self._text = stage, text
         self._scene = SceneView(stage.client.scene, KEY, stage.post)
-        self._html: Block = add_html(stage.client.gui)
         self._player: Player | None = None
         self._drawing: ExampleDrawing | None = None
         self._left: Array | None = None  # where the visitor's arm was heading when it began
-        self._said: tuple[object, ...] = ()
-        self._show_words()
 
     @property
     def is_open(self) -> bool:
         """Whether the example is on show."""
         return self._player is not None
+
+    @property
+    def words(self) -> tuple[Any, ...] | None:
+        """What its words and buttons depend on; None: the lesson has no example."""
+        player = self._player
+        if self._text is None:
+            return None
+        if player is None:
+            return (self._text.title,)
+        count = len(player.example.steps)
+        return self._text.title, player.step, player.at, count, player.arrived, player.playing
 
     def press(self, button: object) -> None:
         """A button was pressed; raises `kin.InputError` for one that does not exist."""
@@ -69,19 +75,19 @@ class ExampleView:
         self._player = self._drawing = self._left = None
         self._scene.remove()
         self._stage.show_all()
-        self._show_words()
 
-    def on_pose(self) -> None:
-        """The visitor's arm moves: who moves it wants to see it."""
-        if self._left is not None and not (self._left == self._stage.now.goal).all():
-            self.close()
+    def on_pose(self) -> bool:
+        """The visitor's arm moves: who moves it wants to see it; returns whether the example has ended."""
+        if self._left is None or (self._left == self._stage.now.goal).all():
+            return False
+        self.close()
+        return True
 
     def on_style(self, text: WorkedText | None) -> None:
         """The units have changed, or the words."""
         if text is not self._text:
             self.close()  # another example may have fewer steps
-            self._text, self._said = text, ()
-            self._show_words()
+            self._text = text
         elif self._player is not None:
             self._player.use(self._example())
             self._show()
@@ -118,15 +124,3 @@ class ExampleView:
         walk = step.walk[0] + share * (step.walk[1] - step.walk[0])
         behind = step.way[: max(1, round(share * (len(step.way) - 1)) + 1)]
         self._scene.show(drawing.nodes(q, step.drawn, behind, walk, self._stage.units))
-        self._show_words()
-
-    def _show_words(self) -> None:
-        player = self._player
-        if self._text is None:
-            return
-        said: tuple[object, ...] = (self._text.title,)
-        if player is not None:
-            said = (player.step, player.at, player.arrived, player.playing, player.is_last)
-        if said != self._said:
-            self._said = said
-            update_html(self._html, render("guide/example", title=self._text.title, player=player))

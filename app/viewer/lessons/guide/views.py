@@ -32,6 +32,12 @@ def goal_html(lesson: str, outline: Outline) -> str:
     return render("guide/goal", lesson=title, goal=outline.goal, note=note, language=language_of(text))
 
 
+def example_html(title: str, *going: object) -> str:
+    """The button of the worked example; while it is on show, what it has come to (`ExampleView.words`)."""
+    names = "step", "at", "count", "arrived", "playing"
+    return render("guide/example", title=title, player=dict(zip(names, going, strict=False)))
+
+
 def language_of(text: LessonText | None) -> str:
     """The code of the language of a lesson's words."""
     return ENGLISH if text is None or text.translation is None else text.translation.language

@@ -250,7 +250,7 @@ def server() -> Iterator[int]:
 
 def test_a_typed_length_is_drawn_and_the_right_one_only_when_it_is_on_show(server: int) -> None:
     def nodes(tab: FakeBrowser) -> set[str]:
-        found = (name for name in tab.nodes if name.startswith("/answer-") and tab.visible.get(name, True))
+        found = (name for name in tab.nodes if name.startswith("/guide-") and tab.visible.get(name, True))
         return {name.split("/")[-1].partition("~")[0] for name in found} - {""}
 
     def through(tab: FakeBrowser) -> bool:
@@ -313,7 +313,7 @@ def test_the_camera_moves_back_until_it_shows_where_an_answer_leads_and_comes_ba
         tab.say("feature", ["guide", ["answer", "e1", 1], 0])
         tab.wait(lambda: any("your answer" in str(m["props"].get("text")) for m in tab.nodes.values()))
         tab.settle()
-        found = [m for name, m in tab.nodes.items() if name.startswith("/answer-") and "points" in m["props"]]
+        found = [m for name, m in tab.nodes.items() if name.startswith("/guide-") and "points" in m["props"]]
         points = np.array(found[0]["props"]["points"], float).reshape(-1, 3)
         top = points[np.argmax(points[:, 2])]
         assert not contains(before, 956 / 720, top[None], 0.0), "up to here, it would leave the picture"

@@ -278,7 +278,7 @@ def test_a_wrong_angle_is_drawn_beside_the_arm(server: int) -> None:
     l1, l2 = (row.a for row in planar.rows)
 
     def ghosts(tab: FakeBrowser) -> list[str]:
-        return [name for name in tab.nodes if re.match("/answer-.*/", name) and tab.visible.get(name, True)]
+        return [name for name in tab.nodes if re.match("/guide-.*/", name) and tab.visible.get(name, True)]
 
     def corners(theta1: float) -> np.ndarray:
         """Base, elbow and tool of the copy, in the plane: its elbow is bent the other way."""

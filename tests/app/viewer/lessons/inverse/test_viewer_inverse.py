@@ -543,7 +543,7 @@ def test_a_wrong_angle_is_drawn_beside_the_arm(port: int, robot: Robot) -> None:
     assert asked.drawn is not None
 
     def copies(tab: FakeBrowser) -> dict[str, str]:
-        names = [name for name in tab.nodes if name.startswith("/answer-") and tab.visible.get(name, True)]
+        names = [name for name in tab.nodes if name.startswith("/guide-") and tab.visible.get(name, True)]
         return {name.rpartition("/")[2]: name for name in names}
 
     with FakeBrowser(port) as tab:
