@@ -202,7 +202,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.mcp", "app.service.main", "app.shared"},
     "app/servos/command.py": {
-        *("kin", "app.cli.terminal", "app.live", "app.notebook.process", "app.servos", "app.viewer.session.state"),
+        *("kin", "app.live", "app.notebook.process", "app.servos", "app.viewer.session.state"),
     },
     "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }

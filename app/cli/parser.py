@@ -193,9 +193,13 @@ def _load_open() -> Run:
 
 
 def _load_so101() -> Run:
+    from app.cli.terminal import robot_of, store_of
     from app.servos.command import run
 
-    return run
+    def run_so101(arguments: argparse.Namespace) -> int:
+        return run(arguments, robot_of(arguments), store_of(arguments).robots)
+
+    return run_so101
 
 
 def _load_mcp() -> Run:

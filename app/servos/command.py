@@ -14,12 +14,11 @@ import threading
 import time
 import webbrowser
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from queue import SimpleQueue
 from typing import Any, Final
 
 import kin
-from app.cli.terminal import robot_of, store_of
 from app.live import invite
 from app.notebook.process import ServiceProcess
 from app.viewer.session.state import encode, with_arm
@@ -32,8 +31,11 @@ STOPPING: Final = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if ha
 MISSING: Final = "this needs an extra: pip install 'kinboard[so101]'"
 
 
-def run(arguments: Namespace) -> int:
-    """Show the arm and drive it until the owner or the page ends it; 1: why it was stopped; 2: no extra."""
+def run(arguments: Namespace, robot: kin.Robot, known: Sequence[kin.Robot]) -> int:
+    """Show the arm and drive it until the owner or the page ends it; `known`: the arms of its service.
+
+    Returns 0, 1 after a line that says why it was stopped, or 2 without the extra.
+    """
     try:
         from app.servos.bus import Bus
         from app.servos.calibration import Calibration
@@ -50,10 +52,9 @@ def run(arguments: Namespace) -> int:
     try:
         port = arguments.port or find_port()
         calibration = Calibration(arguments.calibration, port)
-        robot = robot_of(arguments)
         if arguments.code is None:
             calibration.applied(robot)  # what is lacking is said before a page is opened
-        with contextlib.closing(Bus(port)) as bus, _page(arguments, robot) as page:
+        with contextlib.closing(Bus(port)) as bus, _page(arguments, robot, known) as page:
             print(f"Connected to the page with {page.robot.name}.", flush=True)
             session = Session(page, bus, calibration.applied, typed(), arguments.speed, arguments.seconds)
             session.run(arguments.release)
@@ -78,7 +79,7 @@ def typed() -> SimpleQueue[str]:
 
 
 @contextlib.contextmanager
-def _page(arguments: Namespace, robot: kin.Robot) -> Iterator[Any]:
+def _page(arguments: Namespace, robot: kin.Robot, known: Sequence[kin.Robot]) -> Iterator[Any]:
     """The page with a code, or a new one in the browser."""
     if arguments.code is not None:
         with kin.connect(arguments.address, arguments.code, name=NAME, token=arguments.token, rate=RATE) as page:
@@ -88,7 +89,7 @@ def _page(arguments: Namespace, robot: kin.Robot) -> Iterator[Any]:
         ticket, code = invite()
         service.send({"ticket": ticket, "code": code})
         address = f"http://localhost:{service.port}/"
-        state = encode(with_arm(robot, None, store_of(arguments).robots))
+        state = encode(with_arm(robot, None, known))
         url = f"{address}viewer/?shown={ticket}#s={state}"
         print(f"Opening {url}", flush=True)
         if not webbrowser.open(url):
