@@ -45,11 +45,18 @@ class _Stamp(NamedTuple):
 
 
 class _Folder:
-    """The TOML files of a folder, of which it is known when each was changed."""
+    """The TOML files of a folder, of which it is known when each was changed.
+
+    Raises:
+        ExerciseFileError: the folder cannot be read.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.stamps = _stamps(path) if path.is_dir() else {}
+        try:
+            self.stamps = _stamps(path)
+        except OSError as error:
+            raise ExerciseFileError(str(path), "folder", error.strerror, "a folder that can be read") from None
         self._looked = time.monotonic()
 
     @property
@@ -269,8 +276,6 @@ class Lessons:
         self._own: dict[tuple[str, str], LessonText] = {}
         self._bare: dict[tuple[str, str], LessonText] = {}  # without a file, in a language that others have
         self._files = None if folder is None else _Folder(folder)
-        if self._files is not None and not self._files.path.is_dir():
-            raise ExerciseFileError(str(folder), "folder", "none", "a folder that can be read")
         if self._files is not None:
             self._take([*self._files.stamps])
         if language not in self.languages:
@@ -300,9 +305,10 @@ class Lessons:
         key = lesson, self.spoken(language)
         if key[1] == ENGLISH:
             return texts_of(lesson)
-        if key not in self._bare:
-            self._bare[key] = in_language(self._original(lesson), key[1])
-        return self._bare[key]
+        with _reading:  # another thread may read the original anew
+            made = self._bare.get(key) or in_language(self._original(lesson), key[1])
+            self._bare[key] = made
+        return made
 
     def _original(self, lesson: str) -> LessonText:
         return self._own.get((lesson, ENGLISH)) or texts_of(lesson)
@@ -318,7 +324,7 @@ class Lessons:
             except ExerciseFileError as error:
                 log.warning("a file is no lesson: %s", error)
             else:
-                self._paths[key] = path
+                self._paths = {**self._paths, key: path}  # another thread may go through those before
                 changed.add(key[0])
         for key, path in sorted(self._paths.items(), key=lambda one: one[0][1] != ENGLISH):
             if key[0] in changed:

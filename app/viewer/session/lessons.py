@@ -58,7 +58,8 @@ class LessonChoice:
         self._stage = stage
         with parent:
             bar = add_html(gui)
-            self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
+            self._offered = self._titles()
+            self._choice = gui.add_dropdown("Lesson", tuple(self._offered), initial_value=NONE, hint=HINT)
             self.exercises = Practising(stage)
             self.courses = CourseFeature(stage, bar)
             self.author = Author(stage)
@@ -80,11 +81,12 @@ class LessonChoice:
         Raises:
             kin.InputError: for an unknown title.
         """
+        self._offer()
         chosen = next((each for each in choices() if each.title == title), None)
         if chosen is None and title != NONE:
-            assign(self._choice, self._title)
+            assign(self._choice, self._shown_title)
             raise InputError("lesson", title, "one of " + ", ".join((NONE, *(each.title for each in choices()))))
-        assign(self._choice, self._said(chosen))
+        assign(self._choice, self._as_offered(NONE if chosen is None else chosen.title))
         self.remove()
         try:
             with self._parent:
@@ -139,23 +141,34 @@ class LessonChoice:
         return self._stage.activity.opened, None if self.guide is None else self.guide.done
 
     @property
-    def _title(self) -> str:
-        return self._said(next((each for each in choices() if each.key == self._stage.activity.lesson), None))
+    def _shown_title(self) -> str:
+        """What the dropdown shows."""
+        key = self._stage.activity.lesson
+        return self._as_offered(next((each.title for each in choices() if each.key == key), NONE))
 
-    @property
-    def _titles(self) -> tuple[str, ...]:
-        return (NONE, *map(self._said, choices()))
+    def _as_offered(self, title: str) -> str:
+        return next(said for said, own in self._offered.items() if own == title)
 
-    def _said(self, chosen: type[Feature] | None) -> str:
-        """The title of a choice in the language of the page."""
-        if chosen is None:
-            return NONE
-        text = self._stage.activity.own_text(chosen.key)
-        return chosen.title if text is None else text.title or chosen.title
+    def _offer(self) -> None:
+        """Let the dropdown have the titles of today: files may have changed them."""
+        if (titles := self._titles()) != self._offered:
+            self._offered = titles
+            self._choice.options = tuple(titles)
+
+    def _titles(self) -> dict[str, str]:
+        """The title of each choice, by that in the language of the page; each is there once."""
+        titles = {NONE: NONE}
+        for each in choices():
+            text = self._stage.activity.own_text(each.key)
+            said = each.title if text is None else text.title or each.title
+            while said in titles:
+                said = f"{said} ({each.title})"
+            titles[said] = each.title
+        return titles
 
     def _post(self, key: Hashable, value: object) -> None:
-        """Choices are known by their own titles, in whatever language one was made."""
-        self._forward(key, next((each.title for each in choices() if self._said(each) == value), value))
+        """Choices are known by their own titles. This is called in the event loop: it reads no files."""
+        self._forward(key, self._offered.get(value, value) if isinstance(value, str) else value)
 
     def _list(self) -> str:
         """All lessons, with one sentence each."""
@@ -164,8 +177,8 @@ class LessonChoice:
 
     def show_language(self) -> None:
         """The page has another language."""
-        self._choice.options = self._titles
-        assign(self._choice, self._title)
+        self._offer()
+        assign(self._choice, self._shown_title)
         if self._overview is not None:
             update_html(self._overview, self._list())
 

@@ -6,7 +6,9 @@ import logging
 import pickle
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from test_lesson_text import SMALL
@@ -230,6 +232,36 @@ def test_a_folder_or_a_language_that_does_not_exist_is_refused(folder: Path) -> 
         Lessons(folder, "fr")
 
 
+def test_a_folder_that_cannot_be_listed_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def denied(self: Path) -> NoReturn:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", denied)
+    with pytest.raises(ExerciseFileError, match=r"folder: got 'Permission denied', expected a folder that can be"):
+        Lessons(folder)
+
+
+def test_languages_are_listed_while_another_thread_reads_the_folder(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Key(tuple[str, str]):
+        def __iter__(self) -> Iterator[str]:
+            if listing:  # what another thread does at this moment
+                listing.clear()
+                (folder / "velocity.fr.toml").write_text("")
+                assert known.own("velocity", "fr") is not None
+            return super().__iter__()
+
+    listing: list[bool] = []
+    monkeypatch.setattr(shelves, "named", lambda path: Key(named(path)))
+    (folder / "velocity.de.toml").write_text("")
+    (folder / "dh.de.toml").write_text("")
+    known = Lessons(folder)
+    listing.append(True)
+    assert list(known.languages) == ["en", "de"]
+    assert list(known.languages) == ["en", "de", "fr"]
+
+
 # The command
 
 
@@ -301,6 +333,30 @@ def test_own_questions_are_asked_about_every_arm(
     assert old in own
     (tmp_path / "velocity.toml").write_text(own.replace(old, new, 1), encoding="utf-8")
     code, _, err = check(tmp_path / "velocity.toml", capsys)
+    assert code != 0
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("before", "more", "message"),
+    [
+        ("[[example.steps]]", 'nothing = "1/(q1 - q1)"\n', "about the arm “Pioneer"),
+        (
+            '[[steps]]\nwhen = "planar"\n',
+            '[steps.question]\nkind = "choice"\nprompt = "?"\n'
+            'options = [{text = "A", right = true, reason = "Yes."}, {text = "B", reason = "No."}]\n',
+            "steps[2].question: got 'The triangle and the cosine rule', expected no question of its own",
+        ),
+        ('title = "Fewer solutions"\n', 'when = "five"\n', "steps[10].when leaves out"),
+    ],
+)
+def test_what_the_page_cannot_show_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], before: str, more: str, message: str
+) -> None:
+    own = lesson_files()["inverse"].read_text(encoding="utf-8")
+    assert before in own
+    (tmp_path / "inverse.toml").write_text(own.replace(before, more + before, 1), encoding="utf-8")
+    code, _, err = check(tmp_path / "inverse.toml", capsys)
     assert code != 0
     assert message in err
 

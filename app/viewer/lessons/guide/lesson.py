@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 from typing import ClassVar
 
 from app.exercises import ExerciseFileError
@@ -12,10 +13,13 @@ from app.exercises.lesson_text import LessonText
 from app.exports.worksheet import Formula, Left
 from app.viewer.feature import Feature
 from app.viewer.lessons.guide.content import AskedFacts, LessonFacts, outline_of
+from app.viewer.lessons.guide.example import example_of
 from app.viewer.lessons.guide.outline import Outline, Question, Step
 from app.viewer.lessons.guide.progress import Progress
 from kin import Robot, get_robot
 from kin.units import DEFAULT_UNITS, Units
+
+VERIFIED = DEFAULT_UNITS, Units(degrees=False, length="m")
 
 log = logging.getLogger("kinboard.lessons")
 
@@ -81,14 +85,15 @@ class Lesson(Feature):
 
     @classmethod
     def verify(cls, text: LessonText) -> None:
-        """Make and judge everything that a text asks, about each of its arms.
+        """Make and judge all questions of a text about each of its arms, and its example, in two sets of units.
 
         Raises:
             ExerciseFileError: naming the file, the field and the arm.
         """
-        for robot in map(get_robot, text.every_arm):
+        for robot, units in product(map(get_robot, text.every_arm), VERIFIED):
             try:
-                for key, question in cls.asked(robot, DEFAULT_UNITS, text).questions():
+                example_of(text.example, units)
+                for key, question in cls.asked(robot, units, text).questions():
                     if not question.judge(question.right()).right:
                         raise ValueError(f"the right answer to question {key} is not accepted")
             except ExerciseFileError:

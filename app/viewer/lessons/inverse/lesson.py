@@ -10,10 +10,11 @@ figure are those of this branch, for the target in the scene.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import kin
-from app.exercises.lesson_text import LessonText, texts_of
+from app.exercises.lesson_text import texts_of
 from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Html, Node
@@ -115,7 +116,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         if self.settings.restart:
             progress.restart()
             self.change(restart=False, taken={})
-        progress.use(self._outline(progress.outline.text))
+        progress.use(self._outline(progress.outline))
         for number, key in enumerate(self.facts.keys, 1):
             self._take_way(progress, str(number), key)
         asked = dict(progress.outline.questions())
@@ -133,10 +134,11 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self.invalidate()
         return self.facts.exercise
 
-    def _outline(self, text: LessonText | None) -> Outline:
-        """The outline with the questions about it."""
+    def _outline(self, before: Outline) -> Outline:
+        """The outline with the questions about it, in the words of the one before."""
         units = self.stage.units
-        return self.completed(outline_of(self._exercise, units, text), self.facts.robot, units)
+        asked = self.completed(outline_of(self._exercise, units, before.text), self.facts.robot, units)
+        return replace(asked, unfit=before.unfit)
 
     def _take_way(self, progress: Progress, number: str, key: StepKey) -> None:
         """Follow the other way where the student has typed it."""
@@ -150,7 +152,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         step = given.followed.derivation.step(key)
         if question.way_of(answer) > 0 and step is not None and step.split >= 0:
             self.change(signs=flipped(given.signs, step.split))
-            progress.use(self._outline(progress.outline.text))
+            progress.use(self._outline(progress.outline))
 
     # Events
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from app.exercises.fields import ExerciseFileError
 from app.exercises.lesson_text import LessonText
 from app.viewer.lessons.guide.leads import bar, up_or_down
 from app.viewer.lessons.guide.outline import (
@@ -54,9 +55,18 @@ def outline(robot: Robot, units: Units, text: LessonText | None = None) -> Outli
 
 
 def outline_of(given: Exercise, units: Units, text: LessonText | None = None) -> Outline:
-    """The outline for a target and the branch that is followed."""
+    """The outline for a target and the branch that is followed.
+
+    Raises:
+        ExerciseFileError: the file has a question for a step of the derivation.
+    """
     texts, keys = words.texts(given.arm.robot, units, text), given.arm.keys
     asked, more = texts.steps[: len(keys)], texts.steps[len(keys) :]  # those after the derivation are as they are
+    for key, step in zip(keys, asked, strict=True):
+        if step.question is not None or (step.estimate is not None and key == "centre"):
+            file = "" if texts.text is None else texts.text.file
+            valid = "no question of its own: the lesson asks about each step of the derivation"
+            raise ExerciseFileError(file, f"{step.at}question", step.title, valid)
     titles = dict(zip(keys, (step.title for step in asked), strict=True))
     steps = (*(_step(given, key, step, units, titles) for key, step in zip(keys, asked, strict=True)), *more)
     return replace(texts, steps=steps, pose=Pose(as_configuration(given.q)))
