@@ -2,6 +2,7 @@
 // All addresses are relative to this page, so the page works under any path prefix.
 
 const here = new URL(".", document.baseURI).href;
+const FAILED = "The service could not start whole: the viewer, or a process that computes for REST, is missing. See the log of the server.";
 const byId = (id) => document.getElementById(id);
 
 function show(state, text) {
@@ -23,9 +24,9 @@ async function openViewerWhenReady() {
   for (;;) {
     const status = await readiness();
     if (status === "ready") break;
-    if (status === "failed") return show("failed", "The viewer could not start; see the log of the server. REST still works.");
-    show("starting", status === "starting" ? "The viewer is starting…" : "Waiting for the server…");
-    await new Promise((resolve) => setTimeout(resolve, 400));
+    if (status === "failed") show("failed", FAILED);
+    else show("starting", status === "starting" ? "The viewer is starting…" : "Waiting for the server…");
+    await new Promise((resolve) => setTimeout(resolve, status === "failed" ? 3000 : 400));
   }
   const viewer = document.createElement("iframe");
   viewer.src = "viewer/";

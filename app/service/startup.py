@@ -14,11 +14,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from app.service.compute.pool import Pool
+from app.service.compute.process import LostError
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.threads import lower_priority
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer
+
+AGAIN = 5.0  # s until processes that could not be started are tried again
 
 logger = logging.getLogger("kinboard.startup")
 
@@ -74,14 +77,14 @@ class Startup:
             viewer = self._make_viewer()
             viewer.start(self._loop)
             self._viewer = self._bridge.viewer = viewer
-            if self._pool is not None:
-                self._pool.wait()
         except Exception:
             if not self._stopping.is_set():
                 # REST goes on working; /readyz reports the failure.
-                logger.exception("the viewer, or a process that computes, could not be started")
+                logger.exception("the viewer could not be started")
                 self.status = "failed"
             return
+        if self._pool is not None:
+            self._wait(self._pool)
         if self._stopping.is_set():
             return
         if self._on_ready is not None:
@@ -89,3 +92,16 @@ class Startup:
         self.status = "ready"
         lower_priority()
         importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
+
+    def _wait(self, pool: Pool) -> None:
+        """Wait until all processes compute, or the service stops."""
+        while not self._stopping.is_set():
+            try:
+                pool.wait()
+            except (LostError, OSError) as error:
+                if not self._stopping.is_set():
+                    logger.error("a process that computes could not be started, and is tried again: %r", error)
+                    self.status = "failed"
+            else:
+                break
+            self._stopping.wait(AGAIN)

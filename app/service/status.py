@@ -48,7 +48,12 @@ async def livez() -> Alive:
 @router.get(
     "/readyz",
     summary="Is the service ready?",
-    responses={503: {"model": Readiness, "description": "It is starting, or the viewer failed."}},
+    responses={
+        503: {
+            "model": Readiness,
+            "description": "It is starting, or the viewer or a process that computes could not start.",
+        }
+    },
 )
 async def readyz(request: Request, response: Response) -> Readiness:
     status: Status = request.app.state.startup.status

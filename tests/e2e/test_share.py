@@ -232,6 +232,18 @@ def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Bro
 
 
 @pytest.mark.full
+def test_the_landing_page_asks_again_after_a_failed_start(browser: Browser, address: str) -> None:
+    page = browser.new_page()
+    page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "failed"}'))
+    page.route("**/viewer/", lambda route: route.fulfill(body="the viewer"))
+    page.goto(address)
+    expect(page.locator("#state-text")).to_contain_text("The service could not start whole")
+    page.unroute("**/readyz")
+    expect(page.locator("#frame iframe")).to_have_count(1, timeout=WAIT)
+    page.close()
+
+
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "width", "height", "scheme"),
     [("light", 1280, 720, "light"), ("dark", 1280, 720, "dark"), ("phone", 390, 844, "dark")],

@@ -22,6 +22,7 @@ from live_server import serve, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from app.service import startup
 from app.service.compute.pool import Pool
 from app.service.compute.process import LostError
 from app.service.main import create_app, run
@@ -93,23 +94,29 @@ def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
     assert "this version of viser cannot be used" in caplog.text
 
 
-@pytest.mark.parametrize("status", ["ready", "failed"])
-def test_the_service_is_ready_when_its_processes_compute(monkeypatch, status):
-    computes = threading.Event()
+@pytest.mark.parametrize("error", [LostError(), OSError("no memory for a process")], ids=["lost", "no memory"])
+def test_the_service_is_ready_when_its_processes_compute_which_are_tried_again(monkeypatch, error):
+    first, second = threading.Event(), threading.Event()
+    tries = iter([first, second])
 
     def wait(self: Pool) -> None:
-        assert computes.wait(60)
-        if status == "failed":
-            raise LostError
+        turn = next(tries)
+        assert turn.wait(60)
+        if turn is first:
+            raise error
 
+    monkeypatch.setattr(startup, "AGAIN", 0.0)
     monkeypatch.setattr(Pool, "start", lambda self: None)
     monkeypatch.setattr(Pool, "wait", wait)
     settings, store = Settings(), Store()
     with TestClient(create_app(settings, store, pool=Pool(1, settings, store))) as client:
         wait_for(lambda: client.get("/viewer/").status_code == 200, 60)
         assert client.get("/readyz").json() == readiness("starting")
-        computes.set()
-        wait_for(lambda: client.get("/readyz").json() == readiness(status))
+        first.set()
+        wait_for(lambda: client.get("/readyz").json() == readiness("failed"))
+        assert client.get("/viewer/").status_code == 200
+        second.set()
+        wait_for(lambda: client.get("/readyz").json() == readiness("ready"))
 
 
 @pytest.mark.full
