@@ -120,7 +120,8 @@ class Follower:
 
     def _show_view(self, state: PageState) -> None:
         page = self._page
-        view = replace(state.view, dark=page.view.dark, detailed=page.view.detailed)
+        own = page.view
+        view = replace(state.view, dark=own.dark, detailed=own.detailed, language=own.language)
         if view != page.view:
             page.looks.use_view(view)
         if state.frames != page.frames:

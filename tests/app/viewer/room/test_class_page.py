@@ -30,7 +30,8 @@ from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
 from app.viewer.room.wall import DRIVEN, PADS
 from app.viewer.server import ViewerServer
-from app.viewer.session.state import decode
+from app.viewer.session.choices import ViewState
+from app.viewer.session.state import PageState, decode, encode
 from app.viewer.session.worker.threads import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -235,6 +236,17 @@ def test_the_lesson_the_view_and_the_viewpoint_are_shown_too(room: Class) -> Non
     teacher.look()  # where the service has moved the camera
     teacher.look(position=(1.0, 0.5, 0.6), look_at=(0.0, 0.0, 0.2))
     student.wait(lambda: np.allclose(student.camera["position"], (1.0, 0.5, 0.6), atol=1e-3))
+
+
+def test_who_follows_keeps_the_language(room: Class) -> None:
+    _, _, ticket, q = lead(room)
+    state = encode(PageState(view=ViewState(language="de")))
+    student = room.browser(room.hub.rooms.tokens.sign(ticket), state=state)
+    student.wait(lambda: "data-class-bar" in student.html)
+    mode(student, "led")
+    at(student, q)
+    student.settle(0.8)
+    assert decode(student.kept[-1], [ROBOT]).view.language == "de"
 
 
 def test_who_is_frozen_cannot_move(room: Class) -> None:
