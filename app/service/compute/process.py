@@ -56,7 +56,7 @@ class ComputeProcess:
         self.job: Job | None = None
         self.child: subprocess.Popen[bytes] | None = None
         self._started = -APART
-        self._stopped = False
+        self._stopped = threading.Event()
 
     @property
     def pid(self) -> int | None:
@@ -112,7 +112,7 @@ class ComputeProcess:
     def stop(self) -> None:
         """End the process, and start no other one."""
         with self._lock:
-            self._stopped = True
+            self._stopped.set()
             running = self.child
             if running is not None:
                 running.kill()
@@ -147,10 +147,10 @@ class ComputeProcess:
             return running
         if running is not None:
             self._bury(running, expected=False)
-        time.sleep(max(0.0, self._started + APART - time.monotonic()))
+        self._stopped.wait(self._started + APART - time.monotonic())
         self._started = time.monotonic()
         with self._lock:
-            if self._stopped:
+            if self._stopped.is_set():
                 raise LostError
             started = self.child = start_process(f"from {child.__name__} import main; main()")
         try:
@@ -163,7 +163,7 @@ class ComputeProcess:
     def _bury(self, ended: subprocess.Popen[bytes], expected: bool) -> None:
         with self._lock:
             self.child = None
-            silent = expected or self._stopped
+            silent = expected or self._stopped.is_set()
         code = _kill(ended)
         if not silent:
             logger.error("a process that computes has ended with code %s; another one takes its place", code)

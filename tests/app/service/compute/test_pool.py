@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -232,6 +233,22 @@ def test_each_process_is_waited_for_and_one_that_does_not_start_is_an_error(stan
     monkeypatch.setattr(pool_jobs, "STAND_IN", "raise SystemExit(1)")
     with pytest.raises(module.LostError):
         stand_ins().wait()
+
+
+def test_a_stop_does_not_wait_until_a_process_may_be_started_again(stand_ins, monkeypatch, caplog):
+    monkeypatch.setattr(process, "APART", 60.0)
+    monkeypatch.setattr(pool_jobs, "STAND_IN", "raise SystemExit(1)")
+    pool, ended = stand_ins(), threading.Event()
+
+    def wait() -> None:
+        with pytest.raises(module.LostError):
+            pool.wait()
+        ended.set()
+
+    threading.Thread(target=wait, daemon=True).start()
+    wait_for(lambda: "has ended" in caplog.text)
+    pool.stop()
+    assert ended.wait(10)
 
 
 def test_the_memory_of_the_processes_is_known(stand_ins):
