@@ -336,7 +336,7 @@ class _Page:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
         # A menu that opens beside a phone's screen must not widen the page.
         html = html.replace(b"initial-scale=1", b"initial-scale=1, minimum-scale=1", 1)
-        # Before viser's own script, which it must come before.
+        # Must come before viser's own script.
         self._html = html.replace(b"<head>", b"<head>" + _OURS + link.encode(), 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {
