@@ -9,7 +9,7 @@
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const revision = () => Number(part("table")?.dataset.revision ?? 0);
-  const anyWrong = () => document.querySelector("[data-arm] [aria-invalid=true]") !== null;
+  const anyWrong = () => document.querySelector('[data-arm^="wrong"]:not([hidden])') !== null;
   const send = (key, value, done) => channel.send("feature", ["robot", key, value], done);
 
   // Typed cells

@@ -58,3 +58,12 @@ def test_a_new_row_is_the_one_for_the_buttons(empty: Tab) -> None:
     expect(here).to_have_text("Row 1")
     page.evaluate(ADD)
     expect(here).to_have_text("Row 2")
+
+
+def test_escape_takes_back_a_choice_that_was_refused(empty: Tab) -> None:
+    kind, wrong = empty.page.locator('[data-cell="0 kind"]'), empty.page.locator('[data-arm="wrong"]')
+    kind.select_option("fixed")
+    expect(wrong).to_contain_text("Row 1, kind")
+    kind.press("Escape")
+    expect(wrong).to_be_hidden()
+    expect(kind).to_have_value("revolute")

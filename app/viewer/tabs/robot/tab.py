@@ -134,7 +134,10 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         super().restore({"texts": {}, "compare": {}, **state})
 
     def on_style(self) -> None:
-        self.change(rows=self.settings.rows + 1)
+        before, other = self.settings, self.read.units != self.stage.units
+        texts = before.texts.valid(lambda cell: other or workpieces.workpiece_of(cell[0]) is not None)
+        self.change(texts=texts, rows=before.rows + other)
+        self._say_lost(_lost(before.texts, texts))
         super().on_style()
 
     def on_leave(self) -> None:
@@ -198,9 +201,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
             case "frame-add":
                 self.stage.use_frames(workpieces.added(self.stage))
             case "frame-remove":
-                frames = workpieces.removed(self.stage.frames, value)
-                self.change(texts=self.settings.texts.valid())
-                self.stage.use_frames(frames)
+                self.stage.use_frames(workpieces.removed(self.stage.frames, value))
             case "other":
                 self._comparing.choose(value)
             case "agree":
@@ -236,20 +237,23 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         """Write every field anew, with these texts."""
         self.change(texts=texts, written=self.settings.written + 1)
 
-    def _edit(self, own: OwnArm, texts: Texts, cell: Cell | None = None) -> None:
-        """Show a changed arm, and these texts in its fields; `cell`: the only one that was typed into."""
-        mine, before = self._own is not None, self.settings
-        lost = _lost(before.texts) if cell is None else ""
+    def _edit(self, own: OwnArm, texts: Texts, *typed: Cell) -> None:
+        """Show a changed arm, and these texts in its fields; `typed`: the cells that made it."""
+        mine, before, replaced = self._own is not None, self.settings, None
+        lost = _lost(before.texts, texts, *typed)
         self.change(texts=texts)
-        if edits.alike(own.robot, self.stage.now.robot, mine or cell == ("arm", "name")):
-            return
-        replaced = None if mine else self.stage.own
-        self.stage.edit_arm(own)  # which calls `on_robot`
-        self.change(texts=texts, rows=self.settings.rows if cell is None else before.rows)
-        self.schedule()
+        if not edits.alike(own.robot, self.stage.now.robot, mine or ("arm", "name") in typed):
+            replaced = None if mine else self.stage.own
+            self.stage.edit_arm(own)  # which calls `on_robot`
+            self.change(texts=texts, rows=before.rows if typed else self.settings.rows)
+            self.schedule()
         if replaced is not None:
             self._beginnings.say_replaced(replaced, f"{own.robot.name} is now your own arm.", lost)
-        elif lost:
+        else:
+            self._say_lost(lost)
+
+    def _say_lost(self, lost: str) -> None:
+        if lost:
             self.stage.notify(Notice("advice", "A field that was not valid is as before", lost))
 
     def _type(self, where: int | str, column: str, value: object) -> None:
@@ -267,14 +271,15 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
             self._type_workpiece(cell, text)
             return
         texts, robot, units = self.settings.texts, self.stage.now.robot, self.stage.units
-        others = {key: wrong for key, (wrong, _) in texts.wrong.items() if workpieces.workpiece_of(key[0]) is None}
+        kept = texts.valid(lambda other: column == "kind" and other[0] == where)  # the row has other fields then
+        others = {key: wrong for key, (wrong, _) in kept.wrong.items() if workpieces.workpiece_of(key[0]) is None}
         for typed in ({**others, cell: text}, {cell: text}):
             try:
                 own = edits.typed(robot, self._own, typed, units)
             except EditError as error:
                 texts = texts.refused(cell, text, error.message)
             else:
-                self._edit(own, texts.taken(typed), cell)
+                self._edit(own, kept.taken(typed), *typed)
                 return
         self.change(texts=texts)
 
@@ -294,8 +299,10 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         except EditError as error:
             self.change(texts=texts.refused(cell, text, error.message))
         else:
-            self.change(texts=texts.taken({cell: text}))
+            self.change(texts=texts.valid())  # `on_style`, called next, would say they are lost
             self.stage.use_frames(frames)
+            self.change(texts=texts.taken({cell: text}))
+            self.schedule()
 
     def _change_rows(self, action: str, index: int) -> None:
         robot, own = self.stage.now.robot, self._own
@@ -334,7 +341,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
             self._edit(own, self.settings.texts.valid() if texts is None else texts)
 
     def _refuse(self, title: str, detail: str) -> None:
-        """Say why something is not done; fields show what is true again."""
+        """Say why something is not done, and write the fields anew."""
         self._write_fields(self.settings.texts)
         self.stage.notify(Notice("error", title, detail))
 
@@ -388,8 +395,9 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
             self._refuse(UNUSED, str(error))
 
 
-def _lost(texts: Texts) -> str:
-    """For the status: what was typed and is not valid, where it is as before now."""
-    gone = [f"{edits.name_of(cell)} (“{cut(text)}”)" for cell, (text, _) in texts.wrong.items()]
+def _lost(before: Texts, now: Texts, *typed: Cell) -> str:
+    """For the status: what was not valid and is neither kept nor among the cells that are valid now."""
+    lost = before.wrong.keys() - now.wrong.keys() - set(typed)
+    gone = [f"{edits.name_of(cell)} (“{cut(text)}”)" for cell, (text, _) in before.wrong.items() if cell in lost]
     more = f" and {len(gone) - 3} more" if len(gone) > 3 else ""
     return f"Not used: {', '.join(gone[:3])}{more}." if gone else ""

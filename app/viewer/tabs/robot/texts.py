@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from app.viewer.tabs.robot.edits import Cell
@@ -53,9 +53,9 @@ class Texts:
         others = {other: said for other, said in self.wrong.items() if other != cell}
         return replace(self, wrong={**others, cell: (text, why)})
 
-    def valid(self) -> Texts:
-        """Without those that are not valid."""
-        return replace(self, wrong={})
+    def valid(self, among: Callable[[Cell], bool] = lambda _: True) -> Texts:
+        """Without those, among these cells, that are not valid."""
+        return replace(self, wrong={cell: said for cell, said in self.wrong.items() if not among(cell)})
 
     def moved(self, action: str, index: int) -> Texts:
         """The valid ones when rows change.

@@ -247,6 +247,65 @@ def test_a_wrong_cell_is_marked_and_the_last_valid_arm_stays(port: int) -> None:
         assert cell(tab, "0 d") == "130"
 
 
+def test_what_is_not_valid_ends_with_its_row_unit_or_frame(port: int) -> None:
+    with FakeBrowser(port) as tab:
+
+        def lost() -> set[str]:
+            return set(re.findall(r"Not used: ([^.]*)\.", html.unescape(tab.html)))
+
+        tab.settle()
+        type_in(tab, 0, "low", "9o")
+        type_in(tab, 0, "home", "8o")
+        type_in(tab, 1, "alpha", "7o")
+        type_in(tab, 0, "kind", "fixed")
+        assert list(wrong(tab)) == ["1 alpha"], "a fixed row has no such fields"
+        assert [text in part(tab, "wrong") for text in ("9o", "7o")] == [False, True]
+        assert "8o" not in part(tab, "wrong-motion")
+        assert lost() == {"row 1, lower limit (“9o”), row 1, home (“8o”)"}
+        type_in(tab, 0, "kind", "revolute")
+        assert list(wrong(tab)) == ["1 alpha"]
+        say(tab, "discard")
+        type_in(tab, 0, "low", "")
+        type_in(tab, 0, "high", "")
+        assert wrong(tab) == {}, "it has no limits now"
+        type_in(tab, 1, "alpha", "7o")
+        type_in(tab, 0, "high", "90")
+        assert list(wrong(tab)) == ["0 high", "1 alpha"], "it waits for the other limit"
+        type_in(tab, 0, "kind", "none")
+        assert list(wrong(tab)) == ["0 high", "1 alpha"], "what is refused changes nothing else"
+        assert "Row 1, kind" in part(tab, "wrong")
+        type_in(tab, 0, "kind", "revolute")
+        assert list(wrong(tab)) == ["1 alpha"]
+        assert lost() == {"row 1, upper limit (“90”)"}
+
+        say(tab, "discard")
+        tab.set("Radians", True)
+        tab.settle()
+        upper = cell(tab, "1 high")
+        type_in(tab, 1, "low", "9")
+        assert list(wrong(tab)) == ["1 low"]
+        tab.set("Radians", False)
+        tab.settle()
+        assert wrong(tab) == {}, "9 would be another angle now"
+        assert lost() == {"row 2, lower limit (“9”)"}
+        assert float(cell(tab, "1 high")) == pytest.approx(math.degrees(float(upper)), abs=1e-3)
+
+        type_in(tab, 1, "a", "6o")
+        before = revision(tab)
+        say(tab, "frame-add")
+        type_in(tab, "frame-0", "x", "5o")
+        type_in(tab, "frame-0", "y", "5")
+        assert list(wrong(tab)) == ["1 a", "frame-0 x"]
+        assert "frame 1, x (“5o”)" not in lost()
+        assert revision(tab) == before, "what is typed into the rows meanwhile counts"
+        for _ in range(2):
+            tab.say("undo")
+            tab.settle()
+        assert "5o" not in part(tab, "wrong-frames")
+        say(tab, "frame-add")
+        assert list(wrong(tab)) == ["1 a"], "the new frame is another one"
+
+
 def test_rows_examples_convention_and_reset(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
