@@ -183,12 +183,13 @@ class Translation:
     Attributes:
         language: one of `LANGUAGES`.
         said: what is said in place of each text, by place; "": nothing yet.
-        strays: refusals of words for what the lesson does not have: it may have had it in an earlier version.
+        stray: the refusal of the first words for what the lesson does not have: it may have had it in an earlier
+            version. None: there are none.
     """
 
     language: str
     said: Mapping[Place, Mapping[str, str]]
-    strays: tuple[ExerciseFileError, ...]
+    stray: ExerciseFileError | None = None
 
     @property
     def missing(self) -> dict[Place, list[str]]:
@@ -344,7 +345,7 @@ def load_words(path: Path, base: LessonText, language: str = ENGLISH) -> LessonT
     lesson, known = _lesson(data, file, base.facts), base.every_arm
     if others := [arm for arm in lesson.every_arm if arm not in known]:
         raise ExerciseFileError(file, "arms", others[0], f"arms of the lesson: {', '.join(known)}")
-    return replace(lesson, translation=Translation(language, {}, ()))
+    return replace(lesson, translation=Translation(language, {}))
 
 
 class _Said(_Fields):
@@ -357,15 +358,15 @@ class _Said(_Fields):
         """What is said in place of a text; "": nothing."""
         return self.text(original) if self.get(original) not in (None, "") else ""
 
-    def strays(self) -> list[ExerciseFileError]:
-        """Refusals of texts that the lesson does not have here."""
-        found, known = [], self._read
-        for original in self.table:
-            if original not in known:
-                near = get_close_matches(original, known, 1)
-                hint = f", such as {shorten(near[0], 200)}" if near else ""
-                found.append(self.refuse(original, self.table[original], f"a text that the lesson has here{hint}"))
-        return found
+    def stray(self) -> ExerciseFileError | None:
+        """The refusal of the first text that the lesson does not have here."""
+        known = self._read
+        original = next((one for one in self.table if one not in known), None)
+        if original is None:
+            return None
+        near = get_close_matches(original, known, 1)
+        hint = f", such as {shorten(near[0], 200)}" if near else ""
+        return self.refuse(original, self.table[original], f"a text that the lesson has here{hint}")
 
 
 def _translated(data: dict[str, Any], file: str, base: LessonText, language: str) -> LessonText:
@@ -393,14 +394,14 @@ def _translated(data: dict[str, Any], file: str, base: LessonText, language: str
     fields.done()
     lesson = _lesson(_in_words(base.data, say), file, base.facts)
     valid = "the title of a step: " + ", ".join(titles)
-    strays = [steps.refuse(one, one, valid) for one in steps.table if one not in titles]
-    strays += [stray for each in tables.values() for stray in each.strays()]
+    unknown = next((steps.refuse(one, one, valid) for one in steps.table if one not in titles), None)
+    strays = (stray for each in tables.values() if (stray := each.stray()) is not None)
     return replace(
         lesson,
         title=title or base.title,
         about=about or base.about,
         controls={**base.controls, **controls},
-        translation=Translation(language, texts, tuple(strays)),
+        translation=Translation(language, texts, unknown or next(strays, None)),
     )
 
 

@@ -339,8 +339,7 @@ class Lessons:
             log.warning("the words of a lesson are left out: %s", error, extra={"kind": path.name})
             return
         self._own[key] = text
-        if text.translation is not None and text.translation.strays:
-            stray = text.translation.strays[0]
+        if text.translation is not None and (stray := text.translation.stray) is not None:
             log.warning("words are left out: %s", stray, extra={"kind": path.name})
 
 

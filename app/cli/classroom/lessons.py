@@ -31,8 +31,8 @@ def check_lesson(path: Path, as_json: bool) -> int:
     labels.check(text)
     if text.translation is None or not text.translation.said:
         return _describe(text, as_json)
-    if text.translation.strays:
-        raise text.translation.strays[0]
+    if text.translation.stray is not None:
+        raise text.translation.stray
     return _report(lesson, text, text.translation, labels, as_json)
 
 

@@ -73,7 +73,7 @@ def test_what_a_file_says_takes_the_place_of_texts_alone(tmp_path: Path) -> None
         ("check",): ["Many?", "No"],  # single letters are no words
         ("example",): ["one link", "It rests.", "It turns."],
     }
-    assert not translation(found).strays
+    assert translation(found).stray is None
 
 
 @pytest.mark.parametrize(
@@ -99,24 +99,25 @@ def test_a_mistake_is_named_with_its_field(tmp_path: Path, old: str, new: str, m
     assert str(caught.value).isprintable()
 
 
-def test_words_for_what_the_lesson_does_not_have_stray(tmp_path: Path) -> None:
-    more = """
-[lesson]
-"You can\\u001b[2J" = 7
-[steps.Two]
-"Two" = "Zwei"
-[steps.One]
-"There are {kinds}." = "Es gibt"
-"One" = "Eins"
-"""
-    found = words(tmp_path, more)
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ('[steps.Two]\n"Two" = "Zwei"', "steps.'Two': got 'Two', expected the title of a step: One"),
+        (
+            '[lesson]\n"You can\\u001b[2J" = 7',
+            "lesson.'You can\\x1b[2J': got 7, expected a text that the lesson has here",
+        ),
+        (
+            '"There are {kinds}." = "Es gibt"',
+            "steps.One.'There are {kinds}.': got 'Es gibt', expected a text that the lesson has here, such as "
+            "'There are {kind}.'",
+        ),
+    ],
+)
+def test_words_for_what_the_lesson_does_not_have_stray(tmp_path: Path, more: str, message: str) -> None:
+    found = words(tmp_path, f'[steps.One]\n"One" = "Eins"\n{more}')
     assert found.steps[0].title.alternatives[0][1] == "Eins"
-    assert [str(each).partition(": ")[2] for each in translation(found).strays] == [
-        "steps.'Two': got 'Two', expected the title of a step: One",
-        "lesson.'You can\\x1b[2J': got 7, expected a text that the lesson has here",
-        "steps.One.'There are {kinds}.': got 'Es gibt', expected a text that the lesson has here, such as "
-        "'There are {kind}.'",
-    ]
+    assert str(translation(found).stray).partition(": ")[2] == message
 
 
 @pytest.mark.parametrize(
