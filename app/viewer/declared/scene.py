@@ -36,7 +36,8 @@ class Node:
 
     Attributes:
         drag: the event of a handle that is dragged; the method also gets each `DragEvent`.
-        click: the event of a click; of batched meshes, the method also gets which one it was.
+        click: the event of a click.
+        instances: whether the method also gets which of the batched meshes it was.
         keep: whether it is only hidden when it is not shown.
         once: whether its key is never used again once it is gone, so that nobody needs to remember its name.
     """
@@ -51,6 +52,7 @@ class Node:
     keep: bool = True
     click: tuple[Hashable, ...] | None = None
     once: bool = False
+    instances: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -223,7 +225,7 @@ class SceneView:
         if node.drag is not None:
             self._listen(made, one, node.drag)
         if node.click is not None:
-            self._listen_click(made, node.click)
+            self._listen_click(made, node.click, node.instances)
         return one
 
     def _update(self, one: _Shown, node: Node) -> None:
@@ -250,8 +252,7 @@ class SceneView:
 
         gizmo.listen(handle, ring=False, post=post)
 
-    def _listen_click(self, node: Any, event: tuple[Hashable, ...]) -> None:
+    def _listen_click(self, node: Any, event: tuple[Hashable, ...], instances: bool) -> None:
         @node.on_click  # type: ignore[untyped-decorator]
         async def _(click: Any) -> None:
-            index = () if click.instance_index is None else (click.instance_index,)
-            self._post(("do", (*event, *index), 0, 0), None)
+            self._post(("do", (*event, click.instance_index) if instances else event, 0, 0), None)
