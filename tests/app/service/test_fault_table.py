@@ -279,6 +279,7 @@ DECLARED = {
         "exercises": ("exercises",),
         "courses": ("courses",),
         "lti": ("app/classroom/test_lti.py::test_the_service_does_not_start_with_a_wrong_file",),
+        "lessons": ("app/exercises/test_lesson_words.py::test_a_folder_that_cannot_be_listed_is_refused",),
         "kin/codegen/extension/build.py": (
             "kin/codegen/extension/test_build.py::test_only_a_unit_that_has_changed_is_compiled_again",
         ),
