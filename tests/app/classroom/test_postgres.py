@@ -103,10 +103,14 @@ def test_a_value_that_the_server_refuses_concerns_its_room_alone(hubs):
     until(lambda: student.room.problem)
     assert "cannot be stored" in student.room.problem
     other.tell_task("swing")
-    until(lambda: not hub.lives[well.id].unsaved)
+
+    def task_stored() -> object:
+        with hub.database.read() as connection:
+            return connection.scalar(select(Seat.task).where(Seat.id == other.ticket.seat))
+
+    until(lambda: task_stored() == "swing")
     with hub.database.read() as connection:
         assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]
-        assert connection.scalar(select(Seat.task).where(Seat.id == other.ticket.seat)) == "swing"
     assert not other.room.problem
 
 
