@@ -189,7 +189,7 @@ def test_a_program_lives_in_the_link_one_for_each_robot(port: int) -> None:
 
 def type_limit(tab: FakeBrowser, text: str) -> None:
     """Type the upper limit of the first row in the tab *Robot*."""
-    revision = int(re.findall(r'data-revision="(\d+)"><?', tab.html.split('data-arm="table"')[1])[0])
+    revision = int(re.findall(r'data-revision="(\d+)"', tab.html.split('data-arm="table"')[1])[0])
     number = tab.say("feature", ["robot", ["cell", 0, "high"], [revision, text]])
     tab.wait(lambda: tab.script["reply"][0] >= number)
 
