@@ -425,7 +425,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
     def _follow_steps(self) -> None:
         """After an answer, at another step or arm: lesson, page and picture follow what is on show."""
         here, answers = self.is_asked, self._answers
-        shown = self.shown if here and self.stage.now.robot == self.arm else None  # another arm has other steps
+        shown = self.shown if here else None
         if shown is not None and (outline := shown.on_steps(answers.progress)) is not None:
             answers.progress.use(outline)
         progress, activity = answers.progress, self.stage.activity

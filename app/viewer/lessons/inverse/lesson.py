@@ -111,8 +111,9 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     # The steps
 
     def on_steps(self, progress: Progress) -> Outline | None:
-        if self.facts.robot is not self.stage.now.robot:
-            return None
+        at, steps = progress.at, progress.outline.steps
+        if self.facts.robot is not self.stage.now.robot or (at < len(steps) and steps[at].about is not None):
+            return None  # the step is about another arm, whose derivation has other steps
         if self.settings.restart:
             progress.restart()
             self.change(restart=False, taken={})

@@ -13,7 +13,6 @@ from fake_browser import FakeBrowser
 from lesson_arms import arms_of
 
 import kin
-from app.viewer.lessons.postures import questions
 from app.viewer.lessons.postures.lesson import Postures
 from app.viewer.lessons.postures.loop import (
     LOOKS,
@@ -238,7 +237,7 @@ def test_the_steps_are_about_the_arm_that_shows_it() -> None:
 @pytest.mark.full
 @pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 def test_the_arm_is_driven_round_in_the_page(port: int) -> None:
-    steps = questions.outline(ARM, UNITS).steps
+    steps = Postures.asked(arms_of("postures")[0], UNITS).steps
     at = next(i for i, step in enumerate(steps) if step.title == "Drive it round")
     with FakeBrowser(port) as tab:
         tab.settle()
