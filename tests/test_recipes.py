@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-from kin.kernels import ahead
+from compiled import lend_kernels
 
 ROOT = Path(__file__).parents[1]
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -208,9 +207,7 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if path.name != "robots":
             (copy / "kin" / path.name).symlink_to(path)
     shutil.copytree(ROOT / "kin" / "robots", copy / "kin" / "robots", ignore=ignored)
-    kernels = ahead._file()
-    if not (copy / "kin" / kernels.name).exists():
-        (copy / "kin" / kernels.name).symlink_to(kernels)
+    lend_kernels(copy / "kin")
     (copy / "static").symlink_to(ROOT / "static")
     for files in RECIPES.values():
         for name, change in files.items():

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import kin
 from app.servos.ports import SIMULATED, BusError, port_problem
+from app.servos.registers import BAUD, GOAL, HOTTEST, PRESENT, TORQUE, TURN, VOLTAGE
 from app.servos.simulated import SimulatedPort, simulated_arm
 
 GONE: tuple[type[Exception], ...] = (OSError,)  # what is raised once a port is gone
@@ -20,14 +21,10 @@ with suppress(ImportError):  # Windows has no such module
 
     GONE += (termios.error,)
 
-BAUD: Final = 1_000_000
 OTHER_RATES: Final = (500_000, 250_000, 128_000, 115_200, 57_600, 38_400)
 TRIES: Final = 3  # of a packet, before its servo counts as lost
 
-# Registers of the STS series: one byte, or two little-endian.
-LIMITS, TORQUE_ENABLE, GOAL_POSITION, PRESENT_POSITION, SUPPLY = 13, 40, 42, 56, 62
 MODELS: Final = {777: "STS3215", 2825: "STS3250"}
-TURN: Final = 4096  # ticks
 # Bits of a status packet, in the order of their values, and what to do.
 ERRORS: Final = (
     "voltage: is this the arm's own power supply, and its plug all the way in?",
@@ -145,8 +142,8 @@ class Bus:
         def read(address: int, length: int) -> Any:
             return self._ask(motor, lambda: self._packets.readTxRx(self._handler, motor.id, address, length))
 
-        hottest, highest, lowest = read(LIMITS, 3)
-        volts, celsius = read(SUPPLY, 2)
+        hottest, highest, lowest = read(HOTTEST, 3)
+        volts, celsius = read(VOLTAGE, 2)
         if not lowest <= volts <= highest:
             raise BusError(
                 f"{named(motor)} gets {volts / 10:.1f} V, expected {lowest / 10:.1f} to {highest / 10:.1f} V: is "
@@ -165,7 +162,7 @@ class Bus:
 
     def _read(self, motor: kin.motors.Motor, tolerant: bool = False) -> int:
         read = self._packets.read2ByteTxRx
-        value = int(self._ask(motor, lambda: read(self._handler, motor.id, PRESENT_POSITION), tolerant))
+        value = int(self._ask(motor, lambda: read(self._handler, motor.id, PRESENT), tolerant))
         if value >= TURN:
             raise BusError(f"{named(motor)} says {value}, expected a position from 0 to {TURN - 1}")
         return value
@@ -184,7 +181,7 @@ class Bus:
 
     def move(self, goals: Mapping[int, float]) -> None:
         """Set goals by the ids of their servos, ticks, in one packet, which none of them answers."""
-        group = scservo_sdk.GroupSyncWrite(self._handler, self._packets, GOAL_POSITION, 2)
+        group = scservo_sdk.GroupSyncWrite(self._handler, self._packets, GOAL, 2)
         for number, goal in goals.items():
             group.addParam(number, list(int(goal).to_bytes(2, "little")))
         try:
@@ -199,7 +196,7 @@ class Bus:
         """Switch the torque of servos."""
         write = self._packets.write1ByteTxRx
         for motor in motors:
-            self._ask(motor, lambda: (None, *write(self._handler, motor.id, TORQUE_ENABLE, int(on))))  # noqa: B023
+            self._ask(motor, lambda: (None, *write(self._handler, motor.id, TORQUE, int(on))))  # noqa: B023
 
     def close(self) -> None:
         """Close the port; the servos stay as they are."""

@@ -2,7 +2,7 @@
 
 An instruction packet is ``FF FF id length instruction parameters checksum``. A status packet has an error byte in
 place of the instruction. The length counts what follows it, and the checksum is the complement of the sum from the
-id on (Feetech's *communication protocol user manual*, *memory table of the magnetic encoder STS servos*).
+id on (Feetech, *communication protocol user manual*).
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from app.servos.registers import BAUD, GOAL, HOTTEST, LEAST, MODEL, MOST, OFFSET, PRESENT, TORQUE, TURN, VOLTAGE
+
 PING, READ, WRITE, SYNC_WRITE, EVERYBODY = 0x01, 0x02, 0x03, 0x83, 0xFE
-MODEL, LEAST, MOST, HOTTEST, OFFSET, TORQUE, GOAL, PRESENT, VOLTAGE = 3, 9, 11, 13, 31, 40, 42, 56, 62
 SPEED = 3000.0  # ticks/s of a servo on its way
-TURN = 4096  # ticks; the encoder begins again after them
-BAUD = 1_000_000
 
 # A calibration as LeRobot writes it, and where this arm stands at first.
 _RANGES: Final = {

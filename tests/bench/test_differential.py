@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from compiled import lend_kernels
 from differential import trees
 from differential.answers import ask
 from differential.compare import CLOSE, Grade, compare, grade_of
@@ -18,7 +19,6 @@ from differential.report import Tally, show
 from differential.robots import all_robots, shares
 
 import kin
-from kin.kernels import ahead
 
 ROBOTS = all_robots()
 NUMBERS = range(len(KINDS))
@@ -214,8 +214,7 @@ def changed_tree(folder):
     for entry in Path(kin.__file__).parent.iterdir():
         if entry.name not in ("__init__.py", "__pycache__"):
             (folder / "kin" / entry.name).symlink_to(entry)
-    kernels = ahead._file()
-    (folder / "kin" / kernels.name).symlink_to(kernels)
+    lend_kernels(folder / "kin")
     change = (
         "_solve = solve_ik\n"
         "def solve_ik(*arguments, **options):\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import viser
@@ -116,7 +117,7 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         return [
             Html(str, (views.task_html(*head),)),
             Html(str, (views.question_html(asked, sheet, record.closed, door, of),)),
-            *([Native(self._joints)] if asks_arm else []),
+            *([Native(partial(JointSliders, self.stage))] if asks_arm else []),
             Html(str, (foot,)),
         ]
 
@@ -129,9 +130,6 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         if self._asked.form == "frame" and not self._practice.record(exercise).closed:
             nodes.append(drawing.own_frame(s.sheet.ghost, reach))
         return [*nodes, *(() if s.mistaken is None else drawing.mistaken_arm(*s.mistaken))]
-
-    def _joints(self, order: float) -> JointSliders:
-        return JointSliders(self.stage, order)
 
     # Events
 

@@ -23,8 +23,9 @@ import kin
 from app.servos import session
 from app.servos.bus import Bus
 from app.servos.calibration import Calibration
+from app.servos.registers import GOAL, MODEL, TORQUE, TURN, VOLTAGE
 from app.servos.scale import Scale
-from app.servos.simulated import GOAL, MODEL, TORQUE, TURN, VOLTAGE, Line, SimulatedPort
+from app.servos.simulated import Line, SimulatedPort
 from kin.notebook import driving
 
 ARM = kin.get_robot("so101")

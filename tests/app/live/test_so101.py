@@ -30,7 +30,8 @@ from app.servos import command
 from app.servos.bus import Bus
 from app.servos.calibration import Calibration
 from app.servos.ports import BusError, find_port, port_problem
-from app.servos.simulated import GOAL, TORQUE, packet
+from app.servos.registers import GOAL, TORQUE
+from app.servos.simulated import packet
 from kin.notebook import driving
 
 ROOT = Path(__file__).parents[3]
