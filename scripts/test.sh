@@ -29,7 +29,8 @@ trap 'exit 130' INT TERM HUP
 webkit_driver() {
   [ "$(id -u)" != 0 ] || apt_update >&2 || :
   for package in webkitgtk-webdriver webkit2gtk-driver; do
-    if apt-cache show $package >/dev/null 2>&1; then
+    # A name that other packages only mention shows nothing, and is no error.
+    if apt-cache show $package 2>/dev/null | grep -q .; then
       echo $package
       return
     fi
