@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-from kin import IKOptions, JointConstraints, Obstacle, Robot, fk
+from kin import IKOptions, JointConstraints, Obstacle, Robot, fk, link_frames
 from kin.collision import Contact
 from kin.collision.contacts import surroundings
 from kin.ik import Task
@@ -63,6 +63,12 @@ class Arm:
     def T_goal(self) -> Array:
         """The pose ``(4, 4)`` that the tool is moving to, or has reached."""
         return fk(self.robot, self.goal)
+
+    @cached_property
+    def goal_points(self) -> Array:
+        """Origins ``(n, 3)`` of the frames of the links at `goal`."""
+        points: Array = link_frames(self.robot, self.goal)[:, :3, 3]
+        return points
 
     @property
     def aim(self) -> Array:

@@ -128,7 +128,7 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
         f, arm = self.facts, self.facts.arm
         found: list[Work | Sweep] = [Work("singular", is_singular, (arm.robot, arm.goal), rest=REST)]
         if f.leaving is not None:
-            found.append(Work("exits", self.stage.summaries.exits, (arm.robot, f.leaving, arm.obstacles)))
+            found.append(Work("exits", self.stage.services.summaries.exits, (arm.robot, f.leaving, arm.obstacles)))
         if f.settings.drive is not None:
             found.append(Sweep(self._go_on_driving, FRAME))
         return found
@@ -148,12 +148,12 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
 
     def on_find(self) -> None:
         """Look for the ways out of where the arm is."""
-        self.change(leaving=self.stage.now.goal, exit=0, drive=None)
+        self.change(leaving=self.stage.arm.now.goal, exit=0, drive=None)
 
     def _stay(self) -> None:
         """Leave the arm where it is."""
         if self.settings.drive is not None:
-            self.stage.notify(STAYED)
+            self.stage.status.show(STAYED)
         self.change(leaving=None, drive=None)
 
     def _drive(self) -> None:
@@ -161,35 +161,35 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
         shown, found, stage = self.facts.exit, self.facts.exits, self.stage
         if shown is None or found is None:
             return
-        if (held := locked(stage.now, shown.q)) is not None:
-            stage.notify(held)
+        if (held := locked(stage.arm.now, shown.q)) is not None:
+            stage.status.show(held)
         elif shown.keeps_tool:
             self.change(drive=Drive(shown.q))
             self.invalidate()
             self._go_on_driving(FRAME)  # in the press, which is a step that can be undone
         else:
             self.change(leaving=None)
-            stage.move_to(shown.q[-1], left(found, shown, stage.units))
+            stage.arm.move_to(shown.q[-1], left(found, shown, stage.display.units))
 
     def _go_on_driving(self, seconds: float) -> None:
         """A frame of the way out; another motion of the arm ends it."""
         drive, found = self.settings.drive, self.facts.exits
-        here = drive is not None and np.array_equal(drive.here, self.stage.now.goal)
+        here = drive is not None and np.array_equal(drive.here, self.stage.arm.now.goal)
         ways = () if found is None or drive is None else found.exits
         way = next((each for each in ways if drive is not None and np.array_equal(each.q, drive.q)), None)
         if drive is None or found is None or way is None or not here:
             self.change(drive=None, leaving=None)
             if here:
-                self.stage.notify(CHANGED)
+                self.stage.status.show(CHANGED)
             return
-        if (held := locked(self.stage.now, drive.q[drive.passed :])) is not None:
+        if (held := locked(self.stage.arm.now, drive.q[drive.passed :])) is not None:
             self.change(drive=None, leaving=None)
-            self.stage.notify(held)
+            self.stage.status.show(held)
             return
         drive = drive.after(seconds)
         self.change(drive=drive)
-        notice = left(found, way, self.stage.units) if drive.arrived else DRIVEN
-        self.stage.move_to(drive.here, notice, at_once=True)
+        notice = left(found, way, self.stage.display.units) if drive.arrived else DRIVEN
+        self.stage.arm.move_to(drive.here, notice, at_once=True)
         if drive.arrived:
             self.change(drive=None, leaving=None)
 

@@ -10,7 +10,7 @@ import asyncio
 import math
 import threading
 import time
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any, cast
@@ -47,6 +47,17 @@ def controls_of(gui: Any) -> list[tuple[str, Any]]:
     return [(state_of(h).props.label, h) for h in handles if hasattr(state_of(h).props, "label")]
 
 
+class _Part:
+    """A part of a bare page. What it offers is kept by the page itself, where `names` says under which name."""
+
+    def __init__(self, page: Any, names: Mapping[str, str] | None = None, **parts: Any) -> None:
+        self._page, self._names = page, names or {}
+        vars(self).update(parts)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._page, self._names.get(name, name))
+
+
 class BarePage:
     """The stage of one feature; the arm moves where it is sent, at once.
 
@@ -64,6 +75,7 @@ class BarePage:
         self.fence = Fence(cast(Any, self.client), self._answered.set)
         self.store, self.units, self.dark = STORE, DEFAULT_UNITS, False
         self.frame, self.reading = 1 / 30, 0.05
+        self.eye = np.ones(3)  # from the camera's look-at point
         self.own: Any = None
         self.legend, self.driven, self.translucent = "", "", False
         self.notices: list[Any] = []
@@ -75,7 +87,20 @@ class BarePage:
         self.activity = SimpleNamespace(
             changed=lambda: None, lesson=None, withheld=frozenset(), text=lambda lesson: None
         )
+        self._make_parts()
         self.use(robot)
+
+    def _make_parts(self) -> None:
+        self.arm = _Part(self, scene=_Part(self))
+        self.robots = _Part(self, {"show": "change_robot", "edit": "edit_arm"})
+        self.status = _Part(self, {"show": "notify"})
+        self.camera = _Part(self, {"fit": "fit_view", "toward": "eye"})
+        self.channel = SimpleNamespace(show=lambda key, value: setattr(self, key, value))
+        self.joints = _Part(self, {"show_in": "show_joints"})
+        self.rights = _Part(self, {"save": "may_save"})
+        self.links = _Part(self, {"page": "link", "to": "link_to"})
+        self.services = _Part(self, pace=_Part(self, {"interval": "frame"}))
+        self.display = self.picture = _Part(self)
 
     def use(self, robot: kin.Robot, q: Array | None = None, **more: Any) -> None:
         """Show a robot at a configuration, and what else `Arm` has."""
@@ -111,9 +136,6 @@ class BarePage:
     def show_legend(self, html: str) -> None:
         self.legend = html
 
-    def show_driven(self, name: str) -> None:
-        self.driven = name
-
     def show_alone(self, names: str, notice: Any) -> None:
         self.alone = names
 
@@ -128,12 +150,6 @@ class BarePage:
 
     def keep_in_view(self, target: Array | None = None, points: Array | None = None) -> None:
         self.kept.append(np.zeros((0, 3)) if points is None else points)
-
-    def toward_camera(self) -> Array:
-        return np.ones(3)
-
-    def play(self, on: bool) -> None:
-        pass
 
     # What happens
 

@@ -177,8 +177,8 @@ class CourseFeature(OpenableFeature[CourseSettings, Facts[CourseSettings]]):
         if item.kind == "exercise":
             stage.post(("feature", EXERCISES, ("open", item.key, 0)), None)
             return
-        if item.robot and stage.now.robot.id != item.robot:
-            stage.change_robot(self._courses.find(item.robot))
+        if item.robot and stage.arm.now.robot.id != item.robot:
+            stage.robots.show(self._courses.find(item.robot))
         stage.post("lesson", next(lesson.title for lesson in LESSONS if lesson.key == item.key))
 
     def _take(self, field: object, text: str) -> None:
@@ -248,7 +248,7 @@ class CourseFeature(OpenableFeature[CourseSettings, Facts[CourseSettings]]):
         course = self._progress.course
         if course is None:
             return ""
-        return self.stage.link_to({self.key: {"course": self._progress.packed(course)}}, self.key)
+        return self.stage.links.to({self.key: {"course": self._progress.packed(course)}}, self.key)
 
     # The page
 
@@ -262,7 +262,7 @@ class CourseFeature(OpenableFeature[CourseSettings, Facts[CourseSettings]]):
         try:
             self._progress.restore(state)
         except KinematicsError as error:
-            self.stage.notify(Notice("error", "The course cannot be used", str(error)))
+            self.stage.status.show(Notice("error", "The course cannot be used", str(error)))
         self.stage.activity.enter_course()
         if self.shown:
             self._progress.at = None

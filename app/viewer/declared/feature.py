@@ -77,14 +77,14 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._parts: dict[str, DeclaredFeature[Any, Any]] = {}
         super().__init__(stage)
         self._within = within
-        self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
+        self.settings: S = cast(S, self.settings_of.fresh(stage.arm.now.robot))
         self._panel = PanelView(stage.client.gui, self.post, stage.fence)
         self._scene = SceneView(stage.client.scene, self.key, self.post)
         self._runner = Runner(lambda: (within or self).post(("done", ())))
         self.shown_at = 0.0
         self._write = self._stale = self._pressed = False
         self._withheld = stage.activity.withheld
-        self._reads = ArmReads(stage.now)
+        self._reads = ArmReads(stage.arm.now)
         self.facts: F = self._facts()
         self.read = self._drawn = self.facts
         self.built()
@@ -203,24 +203,28 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.invalidate()
         self.read = self._drawn = self.facts
         stage = self.stage
-        self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write, self.labels)
+        self._panel.show(
+            self.panel(), self.settings, stage.arm.now.robot, stage.display.units, self._write, self.labels
+        )
         self._write = False
         self._scene.show(self.scene())
         if (words := self.legend()) is not None:
-            stage.show_legend(words)
+            stage.picture.show_legend(words)
 
     def invalidate(self) -> None:
         """Make `facts` anew if something that they were made of has changed."""
         facts, stage = self.facts, self.stage
         same = (
-            facts.settings is self.settings and facts.works is self._runner.results and facts.units == stage.units
+            facts.settings is self.settings
+            and facts.works is self._runner.results
+            and facts.units == stage.display.units
         )
-        if not (same and self._reads.follow(stage.now)):
-            self._reads = ArmReads(stage.now)
+        if not (same and self._reads.follow(stage.arm.now)):
+            self._reads = ArmReads(stage.arm.now)
             self.facts = self._facts()
 
     def _facts(self) -> F:
-        results, units = self._runner.results, self.stage.units
+        results, units = self._runner.results, self.stage.display.units
         return cast(F, self.facts_of(self.settings, cast(Arm, self._reads), results, units, **self.sources()))
 
     def _follow(self) -> None:
@@ -241,11 +245,11 @@ class DeclaredFeature(Feature, Generic[S, F]):
     @property
     def _outdated(self) -> bool:
         """Whether there is another robot for which `on_robot` has not been called yet."""
-        return self.facts.robot != self.stage.now.robot
+        return self.facts.robot != self.stage.arm.now.robot
 
     @property
     def _interval(self) -> float:
-        return max(self.pace, self.stage.reading)
+        return max(self.pace, self.stage.services.pace.reading)
 
     def _begin(self) -> None:
         """Show what is declared, and begin what goes on."""
@@ -306,7 +310,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def on_robot(self) -> None:
         self._scene.remove()
         self._runner.end()
-        self.settings = self.settings.for_robot(self.stage.now.robot)
+        self.settings = self.settings.for_robot(self.stage.arm.now.robot)
         self.invalidate()
         self.started()
         self._begin()
@@ -359,7 +363,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         return {**self.settings.state(), **{name: part.state() for name, part in self._parts.items()}}
 
     def restore(self, state: dict[str, object]) -> None:
-        self.settings = self.settings.restored(state, self.stage.now.robot)
+        self.settings = self.settings.restored(state, self.stage.arm.now.robot)
         self.rewrite()
         self._begin()
         self.restore_parts(state)
@@ -372,7 +376,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.for_parts(lambda part: part.remove())
         self._runner.end()
         if self.legend() is not None:
-            self.stage.show_legend("")
+            self.stage.picture.show_legend("")
         self._scene.remove()
         self._panel.remove()
 

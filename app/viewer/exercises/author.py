@@ -120,7 +120,7 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
     # Declared
 
     def sources(self) -> Mapping[str, Any]:
-        return {"exercises": self._exercises, "find": self.stage.store.get}
+        return {"exercises": self._exercises, "find": self.stage.services.store.get}
 
     @property
     def _exercises(self) -> Exercises:
@@ -130,12 +130,12 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
     def panel(self) -> Sequence[PanelNode]:
         if not self.shown:
             return ()
-        activity, units, f = self.stage.activity, self.stage.units, self.read
+        activity, units, f = self.stage.activity, self.stage.display.units, self.read
         if activity.practice.seated:
             return [Html(views.student_html, ())]
         if not f.data:
             return [Html(views.start_html, (activity.exercises.all, self.settings.error))]
-        trial, robots = f.trial, tuple(robot.id for robot in self.stage.store.robots)
+        trial, robots = f.trial, tuple(robot.id for robot in self.stage.services.store.robots)
         values, refusal = trial.values(units), self.settings.error or views.Refusal(trial.field, trial.error)
         nodes: list[PanelNode] = [Html(views.head_html, (trial, refusal, self._place))]
         for i, group in enumerate(forms.groups(f.data, robots)):
@@ -146,7 +146,7 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
     @property
     def _place(self) -> views.ServerFolder:
         """What can be done with the draft in the folder of the service."""
-        if not self.stage.may_save:
+        if not self.stage.rights.save:
             return views.ServerFolder(saved=self.read.is_saved)
         obstacle = self._exercises.obstacle
         return views.ServerFolder(not obstacle, obstacle, self.read.is_saved, self.read.known is not None)
@@ -205,7 +205,7 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
                 self._save(one)
             case "bring", [int()], _ if (one := self.facts.exercise) is not None:
                 self._bring(one)
-            case "serve", [int()], _ if self.stage.may_save and (one := self.facts.exercise) is not None:
+            case "serve", [int()], _ if self.stage.rights.save and (one := self.facts.exercise) is not None:
                 self._serve(one)
             case (("try" | "save" | "bring" | "serve"), [int()], _):
                 pass  # the form says what is wrong
@@ -225,7 +225,7 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
         if one is None:
             raise InputError("exercise", origin, "the id of an exercise, or one of the kinds " + ", ".join(KINDS))
         data = forms.read(one.source)
-        if self.stage.may_save and not one.builtin and not known.is_own(one.id) and written_in_a_page(one):
+        if self.stage.rights.save and not one.builtin and not known.is_own(one.id) and written_in_a_page(one):
             self._serves(one)  # it is changed where it is; with another id, a new one
         elif not known.is_own(one.id):
             data["id"] = _free(one.id, known)
@@ -236,7 +236,7 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
         self._open(data)
 
     def _upload(self, file: str, text: str) -> None:
-        parse_exercise(text, file, self.stage.store.get)
+        parse_exercise(text, file, self.stage.services.store.get)
         self._open(forms.read(text))
 
     def _open(self, data: forms.Draft) -> None:
@@ -261,16 +261,16 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
         """Bring the arm to the posture of a student's numbers."""
         if variant is None:
             return
-        if self.stage.now.robot != variant.robot:
-            self.stage.change_robot(variant.robot)
+        if self.stage.arm.now.robot != variant.robot:
+            self.stage.robots.show(variant.robot)
         title = self.facts.trial.exercise.title if self.facts.trial.exercise else self.title
-        self.stage.move_to(variant.q, Notice("hand", title, "The arm shows the posture of these numbers."))
+        self.stage.arm.move_to(variant.q, Notice("hand", title, "The arm shows the posture of these numbers."))
 
     def _take_pose(self, data: forms.Draft) -> None:
         """The arm on show, and its posture, become those of the exercise."""
-        robot, q = self.stage.now.robot, self.stage.now.q
+        robot, q = self.stage.arm.now.robot, self.stage.arm.now.q
         try:
-            known = self.stage.store.get(robot.id) == robot
+            known = self.stage.services.store.get(robot.id) == robot
         except KinematicsError:
             known = False
         if not known:
@@ -290,7 +290,7 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
         course = activity.progress.bring(exercise)
         activity.enter_course()
         detail = "Its link and its file bring the exercise along; the link hides the answer."
-        self.stage.notify(Notice("hand", f"In the course {course.title}", detail))
+        self.stage.status.show(Notice("hand", f"In the course {course.title}", detail))
 
     def _save(self, exercise: Exercise) -> None:
         save_file(self.stage, f"{exercise.id}.toml", self.settings.draft)
@@ -303,7 +303,9 @@ class Author(OpenableFeature[AuthorSettings, Drafted]):
         self._serves(saved)
         self._offer()
         title = f"{saved.title} is {'replaced' if again else 'saved'} on the server"
-        self.stage.notify(Notice("hand", title, "Other pages have it when they next open the list of exercises."))
+        self.stage.status.show(
+            Notice("hand", title, "Other pages have it when they next open the list of exercises.")
+        )
 
     def _serves(self, exercise: Exercise) -> None:
         """The folder of the service has this one of the page."""

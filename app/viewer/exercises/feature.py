@@ -104,9 +104,9 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         exercise, variant, practice = self._practice.at, self.settings.variant, self._practice
         if exercise is None or variant is None:
             return [Html(str, (self._list(),))]
-        activity, units, sheet = self.stage.activity, self.stage.units, self.settings.sheet
+        activity, units, sheet = self.stage.activity, self.stage.display.units, self.settings.sheet
         record, door, asked = practice.record(exercise), self.door, self._asked
-        at_home, own = self.stage.now.robot == exercise.robot, activity.exercises.is_own(exercise.id)
+        at_home, own = self.stage.arm.now.robot == exercise.robot, activity.exercises.is_own(exercise.id)
         led = activity.leads("exercise", exercise.id)
         above = replace(door, back="") if led else door
         head = exercise, variant, units, at_home, record.variant, own and not practice.seated, above
@@ -156,7 +156,7 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
     def on_ghost(self, event: DragEvent) -> None:
         """The visitor has dragged the ghost."""
         if self.shown:
-            self.settings.sheet.drag(pose_from_position_wxyz(event.position, event.wxyz), self.stage.units)
+            self.settings.sheet.drag(pose_from_position_wxyz(event.position, event.wxyz), self.stage.display.units)
 
     def _act(self, key: Hashable, value: object) -> None:
         """An event of the exercise on show."""
@@ -231,7 +231,7 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         except VariantError as error:  # of an operator's file that was not checked
             self._practice.close()
             self.change(variant=None)
-            self.stage.notify(Notice("error", f"{exercise.title} cannot be used", str(error)))
+            self.stage.status.show(Notice("error", f"{exercise.title} cannot be used", str(error)))
             return
         if move:
             self._set_scene(exercise)
@@ -241,11 +241,11 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
     def _set_scene(self, exercise: Exercise) -> None:
         stage, variant = self.stage, self.settings.variant
         assert variant is not None
-        if stage.now.robot != exercise.robot:
-            stage.change_robot(exercise.robot)
+        if stage.arm.now.robot != exercise.robot:
+            stage.robots.show(exercise.robot)
         shows = exercise.kind.shows_posture or self._practice.record(exercise).closed
         q = variant.q if shows else exercise.robot.q_home
-        stage.move_to(q, Notice("hand", exercise.title, "The arm is ready for the exercise."))
+        stage.arm.move_to(q, Notice("hand", exercise.title, "The arm is ready for the exercise."))
         self._fit_view(exercise)
 
     @property
@@ -267,17 +267,17 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         room = [(T[:3, 3], SIZE * exercise.robot.reach) for _, T in self._frames]
         if exercise.q and (closed or exercise.kind.shows_posture):
             room.append(round_points(kin.link_frames(exercise.robot, variant.q)[:, :3, 3]))
-        self.stage.fit_view(room)
+        self.stage.camera.fit(room)
         self.schedule()
 
     def _leave_view(self) -> None:
-        self.stage.fit_view(())
-        self.stage.keep_in_view()
+        self.stage.camera.fit(())
+        self.stage.picture.keep_in_view()
 
     @property
     def _asked(self) -> Asked:
         assert self.settings.variant is not None
-        return self._now.asked(self.settings.variant, self.stage.units)
+        return self._now.asked(self.settings.variant, self.stage.display.units)
 
     def _answer(self, how: str, value: object, sending: str = "") -> None:
         """Judge an answer; `sending` as in `Judged`."""
@@ -289,9 +289,11 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         self.change(mistaken=None)
         try:
             given = (
-                self.stage.now.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
+                self.stage.arm.now.goal.tolist()
+                if form == "posture"
+                else sheet.given(form, value, self.stage.display.units)
             )
-            verdict = exercise.judge(variant, given, self.stage.units)
+            verdict = exercise.judge(variant, given, self.stage.display.units)
         except EntryError as error:
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)
             return
@@ -299,7 +301,7 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
             sheet.error = f"{str(error)[:1].upper()}{str(error)[1:]}."
             return
         sheet.verdict = verdict
-        if verdict.mistaken is not None and self.stage.now.robot == exercise.robot:
+        if verdict.mistaken is not None and self.stage.arm.now.robot == exercise.robot:
             self.change(mistaken=verdict.mistaken.arm_unlike(variant))
         now = time.perf_counter()
         seconds = now - self.settings.since
@@ -333,9 +335,9 @@ class Practising(OpenableFeature[PractisingSettings, Facts[PractisingSettings]])
         assert variant is not None
         notice = Notice("hand", exercise.title, "The arm shows the answer.")
         if self._asked.form == "posture" and self._practice.record(exercise).mark == "shown":
-            self.stage.move_to(np.array(exercise.kind.answer(variant)), notice)
-        elif exercise.q and not exercise.kind.shows_posture and self.stage.now.robot == exercise.robot:
-            self.stage.move_to(variant.q, notice)
+            self.stage.arm.move_to(np.array(exercise.kind.answer(variant)), notice)
+        elif exercise.q and not exercise.kind.shows_posture and self.stage.arm.now.robot == exercise.robot:
+            self.stage.arm.move_to(variant.q, notice)
         self._fit_view(exercise)
 
 
@@ -345,14 +347,14 @@ class JointSliders:
     def __init__(self, stage: Stage, order: float, buttons: bool = False) -> None:
         self._stage = stage
         self._folder: viser.GuiFolderHandle = stage.client.gui.add_folder("Joints of the arm", order=order)
-        stage.show_joints(self._folder)
+        stage.joints.show_in(self._folder)
         if buttons:
             with self._folder:
                 go_to_buttons(stage.client.gui, stage.post)
 
     def remove(self) -> None:
         """Remove them."""
-        self._stage.show_joints(None)
+        self._stage.joints.show_in(None)
         self._folder.remove()
 
 

@@ -9,9 +9,9 @@ It takes the first of a few places that is free, and stays there while it is::
         with self.figure as figure:
             return [*figure.line("normal", a, b, "x₁", RED), *figure.dimension("upper", c, d, "l₁", units, aside)]
 
-The links of an arm hide what is inside them: call ``stage.see_through(True)`` while a figure is on show. Labels
-are in front of everything, on a plate of their own, so they are readable in light and dark. Dimensions and angles
-are beside what they measure, at a distance from the arm, and their values are in the reader's units.
+The links of an arm hide what is inside them: call ``stage.arm.scene.see_through(True)`` while a figure is on show.
+Labels are in front of everything, on a plate of their own, so they are readable in light and dark. Dimensions and
+angles are beside what they measure, at a distance from the arm, and their values are in the reader's units.
 """
 
 from __future__ import annotations

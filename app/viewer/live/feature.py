@@ -91,13 +91,13 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         self.schedule()
         if "drives" in values:
             self.change(driven=values["drives"] or "")
-            self.stage.show_driven(self.settings.driven)
+            self.stage.channel.show("driven", self.settings.driven)
             if self.settings.driven:
                 self._tape.stop()
         if "measured" in values:
             measured = values["measured"]
             if measured is not None:
-                measured = self.stage.now.robot.check_q(measured, "measured")
+                measured = self.stage.arm.now.robot.check_q(measured, "measured")
             self.change(measured=measured)
         if values.get("clear"):
             self.change(drawings=None)
@@ -116,7 +116,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
                 if isinstance(value, IncomingFile):
                     self._opening.take(value)
                 else:
-                    self.stage.notify(Notice("error", *not_sent(value)))
+                    self.stage.status.show(Notice("error", *not_sent(value)))
             case ("read", int(number)):
                 self._try(lambda: self._use(self._opening.result(number, value)))
             case _:
@@ -134,7 +134,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
                 if isinstance(error, MeshError)
                 else str(error)
             )
-            self.stage.notify(Notice("error", UNUSED, words))
+            self.stage.status.show(Notice("error", UNUSED, words))
 
     def _use(self, recording: Recording | None) -> None:
         """Have a recording in place of the last one, and show its arm unless something is driven."""
@@ -143,10 +143,10 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         self._tape.open(recording)
         self.change(at=0.0, measured=None)
         self.rewrite()
-        if recording.robot != self.stage.now.robot and not self.settings.driven:
+        if recording.robot != self.stage.arm.now.robot and not self.settings.driven:
             self.on_show_arm()
         words = f"{recording.seconds:.1f} s of the {recording.robot.name}. Play it in the tab Program."
-        self.stage.notify(Notice("hand", f"{self._opening.name} is open", words))
+        self.stage.status.show(Notice("hand", f"{self._opening.name} is open", words))
 
     def on_show_arm(self) -> None:
         """Show the arm of the recording; raises `InputError`."""
@@ -157,13 +157,13 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
                 f"{self.settings.driven} is driven",
                 "Another arm on show would be driven as well. End its program first.",
             )
-            self.stage.notify(Notice("error", *words))
-        elif recording.robot in self.stage.store.robots:
-            self.stage.change_robot(recording.robot)
+            self.stage.status.show(Notice("error", *words))
+        elif recording.robot in self.stage.services.store.robots:
+            self.stage.robots.show(recording.robot)
         else:
             own = own_arm(robot_to_dict(recording.robot))
             recording.robot = own.robot
-            self.stage.show_own(own)
+            self.stage.robots.show_own(own)
 
     def on_cancel(self) -> None:
         """Open no recording after all."""
@@ -196,7 +196,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         name = "" if line is None or line.program is None else line.program.name
         found: list[Work | Sweep] = [Work("program", self._meet, (name,))]
         if self._tape.playing:
-            found.append(Sweep(self._play, self.stage.frame, math.inf))
+            found.append(Sweep(self._play, self.stage.services.pace.interval, math.inf))
         elif name or self._tape.running or self._opening.busy is not None:
             found.append(Sweep(self._look, LOOK_AGAIN))
         return found
@@ -206,9 +206,9 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         before = self.settings.program
         self.change(program=name)
         if name and name != before:
-            self.stage.notify(Notice("hand", f"{name} is connected", "It may move the arm. Tab Program."))
+            self.stage.status.show(Notice("hand", f"{name} is connected", "It may move the arm. Tab Program."))
         elif before and not name and self.stage.door.line is not None:
-            self.stage.notify(Notice("hand", f"{before} has left", "The code still counts."))
+            self.stage.status.show(Notice("hand", f"{before} has left", "The code still counts."))
 
     def _look(self, seconds: float) -> None:
         """Look at the rate of the program and its delay, and how far a recording or a file is."""
@@ -228,7 +228,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if line is None:
             about = Html(views.about)
             return [about, Button("Connect a program", self.event(self.on_open), key="open"), *shown]
-        code = Html(views.code, (line.code, self.stage.service.address), key="code")
+        code = Html(views.code, (line.code, self.stage.links.service.address), key="code")
         state = Html(views.state, views.state_of(line.program), key="state")
         hint = "The connection ends, and this code counts no more"
         return [code, state, *shown, Button("Withdraw the code", self.event(self.on_close), hint, key="close")]
@@ -239,7 +239,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if measured is None:
             return []
         gap = np.round(measured - f.q, 6)
-        args = f.robot, gap.tobytes(), measured.tobytes(), self.stage.units
+        args = f.robot, gap.tobytes(), measured.tobytes(), self.stage.display.units
         return [Html(views.measured, args, key="measured")]
 
     def _recorded(self) -> list[PanelNode]:
@@ -256,7 +256,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if recording is None:
             return new
         why = "" if recording.ended in (None, STOPPED, READ) else recording.ended
-        other = "" if recording.robot == self.stage.now.robot else recording.robot.name
+        other = "" if recording.robot == self.stage.arm.now.robot else recording.robot.name
         state = "running" if tape.running else "opened" if recording.ended == READ else "ended"
         args = round(recording.seconds, 1), len(recording.entries), recording.size, state, why, other
         shown = Html(views.recording, args, key="recording")
@@ -280,12 +280,12 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         drawn, measured = tuple((self.settings.drawings or {}).values()), self.settings.measured
         found: list[SceneNode | Lazy] = [Lazy("drawings", nodes, (drawn,))] if drawn else []
         if measured is not None:
-            found.append(ghost("measured", self.stage.now.robot, measured, GHOST, OPACITY))
+            found.append(ghost("measured", self.stage.arm.now.robot, measured, GHOST, OPACITY))
         return found
 
     def on_open(self) -> None:
         """Show a code."""
-        self.stage.door.open(self.stage.now.robot)
+        self.stage.door.open(self.stage.arm.now.robot)
 
     def on_record(self) -> None:
         """Record what the program sends and hears from now on."""
@@ -315,7 +315,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if self.settings.driven:
             title = f"{self.settings.driven} is driven"
             detail = "It would move as recorded. Let its program play the recording."
-            self.stage.notify(Notice("error", title, detail))
+            self.stage.status.show(Notice("error", title, detail))
         return self._tape.playable and not self.settings.driven
 
     def on_save(self, kind: str) -> None:
@@ -333,5 +333,5 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         self.stage.door.close()
         self._tape.end(STOPPED)
         self.change(drawings=None, measured=None, program="", driven="")
-        self.stage.show_driven("")
-        self.stage.notify(Notice("hand", "The code is withdrawn", "No program can move this page with it."))
+        self.stage.channel.show("driven", "")
+        self.stage.status.show(Notice("hand", "The code is withdrawn", "No program can move this page with it."))

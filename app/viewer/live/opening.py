@@ -31,7 +31,7 @@ class Opening:
 
     def __init__(self, stage: Stage, post: Post, bounds: Bounds) -> None:
         self._stage, self._post, self._bounds = stage, post, bounds
-        self._awaited = Awaited(lambda *words: stage.notify(Notice("error", *words)))
+        self._awaited = Awaited(lambda *words: stage.status.show(Notice("error", *words)))
         self._future: Future[Recording] | None = None
         self._number = 0
         self.name = ""  # of the file that is being read or was read last
@@ -57,7 +57,7 @@ class Opening:
         self._cancel()
         self.name = file.name
         self._number += 1
-        self._future = _reader.submit(_read, file.content(), self._stage.now.robot, self._bounds, file.room)
+        self._future = _reader.submit(_read, file.content(), self._stage.arm.now.robot, self._bounds, file.room)
         self._future.add_done_callback(partial(self._post, ("read", self._number)))
 
     def result(self, number: int, done: object) -> Recording | None:

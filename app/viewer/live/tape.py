@@ -42,7 +42,12 @@ class Tape:
     def playable(self) -> bool:
         """Whether it can be shown: it is of the arm on show, which moves in it."""
         found = self.recording
-        return found is not None and not self.running and found.robot == self._stage.now.robot and self.seconds > 0
+        return (
+            found is not None
+            and not self.running
+            and found.robot == self._stage.arm.now.robot
+            and self.seconds > 0
+        )
 
     @property
     def seconds(self) -> float:
@@ -52,7 +57,7 @@ class Tape:
     def begin(self, line: Line) -> None:
         """Record from now on, in place of the last recording."""
         self.discard()
-        arm, program = self._stage.now, line.program
+        arm, program = self._stage.arm.now, line.program
         self.recording = Recording(
             arm.robot, "" if program is None else program.name, Bounds(SECONDS, BYTES, OF_ALL)
         )
@@ -85,7 +90,9 @@ class Tape:
         try:
             data = to_mcap(self.recording) if kind == "MCAP" else to_csv(self.recording).encode()
         except InputError as error:
-            stage.notify(Notice("error", "The recording was not saved", f"This format is for {error.expected}."))
+            stage.status.show(
+                Notice("error", "The recording was not saved", f"This format is for {error.expected}.")
+            )
             return
         save_file(stage, file, data, "Radians, metres and seconds.")
 
@@ -96,13 +103,13 @@ class Tape:
         if self.time >= self.seconds:
             self.time = 0.0
         self.playing = True
-        self._stage.play(True)
+        self._stage.arm.playing = True
 
     def stop(self) -> None:
         """Leave the arm where it is."""
         if self.playing:
             self.playing = False
-            self._stage.play(False)
+            self._stage.arm.playing = False
 
     def advance(self, seconds: float) -> Array | None:
         """Go on for so many seconds while it is played; returns the measured arm."""
@@ -119,6 +126,6 @@ class Tape:
         self.time = time
         q, measured = self._track.at(time)
         if q is not None:
-            q = self._stage.now.robot.clip(q)
-            self._stage.move_to(q, Notice("hand", f"The recording at {time:.2f} s"), at_once=True)
+            q = self._stage.arm.now.robot.clip(q)
+            self._stage.arm.move_to(q, Notice("hand", f"The recording at {time:.2f} s"), at_once=True)
         return measured

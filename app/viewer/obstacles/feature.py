@@ -1,6 +1,6 @@
 """Obstacles in the panel and the scene: added, chosen, dragged, typed, removed.
 
-The obstacles themselves belong to the page: `Arm.obstacles` and `Stage.use_obstacles`. What is pressed and typed
+The obstacles themselves belong to the page: `Arm.obstacles`, which `stage.arm` keeps. What is pressed and typed
 is sent by ``static/lesson.js``.
 """
 
@@ -83,7 +83,7 @@ class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
 
     def panel(self) -> Sequence[Html]:
         f, s = self.read, self.settings
-        return [Html(panel_html, (f.items, f.chosen, s.touched, s.refused, self.stage.units))]
+        return [Html(panel_html, (f.items, f.chosen, s.touched, s.refused, self.stage.display.units))]
 
     def scene(self) -> Sequence[Node | Lazy]:
         f, s = self.facts, self.settings
@@ -97,7 +97,7 @@ class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
             T = placed.pose(f.items[chosen])
             found.append(nodes.gizmo(T, radius, ("on_drag",)))
             if s.grabbed is not None:
-                found.append(nodes.travel(travel(s.grabbed, T, self.stage.units), T, radius))
+                found.append(nodes.travel(travel(s.grabbed, T, self.stage.display.units), T, radius))
         return found
 
     def on_contacts(self, contacts: Sequence[Contact]) -> None:
@@ -107,7 +107,7 @@ class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
             self.refresh()
 
     def extents(self) -> Sequence[Sphere]:
-        return [(each.T[:3, 3], float(each.row[16])) for each in self.stage.now.obstacles]
+        return [(each.T[:3, 3], float(each.row[16])) for each in self.stage.arm.now.obstacles]
 
     # Events
 
@@ -125,7 +125,7 @@ class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
             case (("remove", int()), _):
                 assert chosen is not None
                 self._open(None)
-                self.stage.notify(Notice("hand", f"Removed: {items[chosen].label}", "Undo brings it back."))
+                self.stage.status.show(Notice("hand", f"Removed: {items[chosen].label}", "Undo brings it back."))
                 self._use(placed.removed(items, chosen))
             case (("set", str(field), int()), str(text)):
                 assert chosen is not None
@@ -162,34 +162,34 @@ class ObstaclesFeature(DeclaredFeature[ObstacleSettings, ObstacleFacts]):
         self.change(chosen=index, refused=None, grabbed=None)
 
     def _add(self, shape: str) -> None:
-        arm, stage = self.stage.now, self.stage
+        arm, stage = self.stage.arm.now, self.stage
         if len(arm.obstacles) >= MOST_OBSTACLES:
             detail = f"A page has at most {MOST_OBSTACLES}. Remove one first."
-            stage.notify(Notice("error", "No obstacle was added", detail))
+            stage.status.show(Notice("error", "No obstacle was added", detail))
             return
         items = placed.added(arm.obstacles, shape, arm.robot, arm.goal)
         self._open(len(items) - 1)
         detail = "Drag its arrows, or type its place and size in the tab Move."
-        stage.notify(Notice("hand", f"Added: {items[-1].label}", detail))
+        stage.status.show(Notice("hand", f"Added: {items[-1].label}", detail))
         self._use(items)
 
     def _type(self, index: int, field: str, text: str) -> None:
         try:
-            items = placed.typed(self.facts.items, index, field, text, self.stage.units)
+            items = placed.typed(self.facts.items, index, field, text, self.stage.display.units)
         except EntryError as error:
             refused = Refused(field, text[:60], f"{field.capitalize()}: {error.detail}")
             self.change(refused=refused)
-            self.stage.notify(Notice("error", "The obstacle stays as it was", refused.why))
+            self.stage.status.show(Notice("error", "The obstacle stays as it was", refused.why))
         else:
             self.change(refused=None)
             self._use(items)
 
     def _use(self, items: Obstacles) -> None:
         """Take what the visitor has made of the obstacles; an arm that avoids them is solved again."""
-        before = self.stage.now.obstacles
-        self.stage.use_obstacles(items)
-        if self.stage.now.avoid and items != before:
-            self.stage.solve_again()
+        before = self.stage.arm.now.obstacles
+        self.stage.arm.use_obstacles(items)
+        if self.stage.arm.now.avoid and items != before:
+            self.stage.arm.solve_again(self.stage.status.shows_result)
 
 
 def panel_html(

@@ -55,6 +55,8 @@ READY = Notice("hand", "Ready", "Drag the coloured arrows at the tool, or move a
 
 TOUCHES = "something touches"  # after "Ready, but"
 
+BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
+
 LOOKING = Notice("hand", "Ready", "You may look: drag the picture to turn the view, and scroll to come closer.")
 
 WELL = (READY.title, "Reached")  # titles that promise that nothing is wrong

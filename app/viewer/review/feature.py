@@ -113,8 +113,8 @@ class Reviewing(Practising):
         self.change(asked_in=lesson.key, arrived=False)
         stage.activity.question_again = missed.key
         stage.activity.leave_item()
-        if stage.now.robot != robot:
-            stage.change_robot(robot)
+        if stage.arm.now.robot != robot:
+            stage.robots.show(robot)
         stage.post("lesson", lesson.title)
         stage.post(("feature", Guide.key, ("again", missed.question, 0)), None)
 

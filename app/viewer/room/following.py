@@ -89,17 +89,17 @@ class Follower:
         if text == self._text:
             return
         self._text = text
-        state = decoded(text, self._page.store.robots)
+        state = decoded(text, self._page.services.store.robots)
         if state.unreadable or state.refused or state.q is None or state.robot is None:
             return
         last, self._shown = self._shown, state
-        if self._page.now.obstacles != self._obstacles:
-            self._own_obstacles = self._page.now.obstacles
+        if self._page.arm.obstacles != self._obstacles:
+            self._own_obstacles = self._page.arm.obstacles
         self._obstacles = state.obstacles
-        self._page.use_obstacles(state.obstacles)
+        self._page.arm.use_obstacles(state.obstacles)
         if last is None or _differs(last, state, "robot", "own", "task", "branch", "locks"):
             self._page.adopt(replace(state, own=self._own(state)))
-        elif not np.array_equal(state.q, self._page.now.goal) or not _equal(state.target, last.target):
+        elif not np.array_equal(state.q, self._page.arm.goal) or not _equal(state.target, last.target):
             self._page.arm.follow(state.q, state.target)
             self.moving, self.moved_at = True, time.perf_counter()
         if state.target is None and (last is None or last.target is not None):
@@ -111,21 +111,21 @@ class Follower:
 
     def drop_obstacles(self) -> None:
         """Return to the visitor's own obstacles, unless the visitor has changed those that were shown."""
-        if self._page.now.obstacles == self._obstacles:
-            self._page.use_obstacles(self._own_obstacles)
+        if self._page.arm.obstacles == self._obstacles:
+            self._page.arm.use_obstacles(self._own_obstacles)
 
     def _own(self, state: PageState) -> OwnArm | None:
         """The leader's own arm if it is on show; otherwise the visitor's stays."""
-        return state.own if state.own is not None and state.own.robot.id == state.robot else self._page.own
+        return state.own if state.own is not None and state.own.robot.id == state.robot else self._page.robots.own
 
     def _show_view(self, state: PageState) -> None:
         page = self._page
-        own = page.view
+        own = page.display.view
         view = replace(state.view, dark=own.dark, detailed=own.detailed, language=own.language)
-        if view != page.view:
+        if view != page.display.view:
             page.looks.use_view(view)
-        if state.frames != page.frames:
-            page.use_frames(state.frames)
+        if state.frames != page.display.frames:
+            page.display.use_frames(state.frames)
 
     def _show_lesson(self, last: PageState | None, state: PageState) -> None:
         """Open the leader's lesson, and show the states of what the leader sees. Exercises are everybody's own."""

@@ -89,7 +89,7 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
         assert self.page.attendance is not None  # taken before the page is built
         self.attendance = self.page.attendance
         self.room: RoomView = self.attendance.room
-        self.follower = Follower(self.page, self.page.may_compute)
+        self.follower = Follower(self.page, self.page.rights.compute)
         self._sharing = Sharing(self.shared_state, self.attendance.tell_page, lambda: self.share_every)
         super().__init__(stage)
 

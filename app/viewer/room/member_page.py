@@ -56,8 +56,3 @@ class MemberPage(VisitorPage):
         self._persistence.led = led
         if led:
             self.arm.dragging = False
-
-    @property
-    def may_compute(self) -> bool:
-        """Whether the visitor may cause work."""
-        return not self._looking

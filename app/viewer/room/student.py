@@ -13,6 +13,7 @@ from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
 from app.viewer.declared.panel import Html, Node
+from app.viewer.live.feature import Connect
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.member import Member, wanted
@@ -99,7 +100,7 @@ class Student(Member):
         if not text or (self.activity.lent is not None and self.activity.lent.source == text):
             return
         try:
-            self.activity.lent = parse_exercise(text, "task", self.stage.store.get)
+            self.activity.lent = parse_exercise(text, "task", self.stage.services.store.get)
         except ExerciseFileError as error:  # of a service with other arms
             self.page.status.show(Notice("error", "The task cannot be used", str(error)))
             return
@@ -276,7 +277,8 @@ class Student(Member):
     def _tell(self) -> None:
         """Say what this page shows, if it is something else: of two tabs, the one that has changed last counts."""
         at = self.activity.exercise
-        shows = "" if at is None else at.id, self._gone and self.leader == "", self.page.driven
+        driven = next((each.settings.driven for each in self.page.features if isinstance(each, Connect)), "")
+        shows = "" if at is None else at.id, self._gone and self.leader == "", driven
         if shows != self._sent_last and self.attendance.room.seat is not None:
             self._sent_last = shows
             self.attendance.tell_task(shows[0])

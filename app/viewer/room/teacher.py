@@ -75,7 +75,7 @@ class Teacher(Member):
         found = []
         for *_, text in own.values():
             try:
-                found.append(parsed(text, self.stage.store.get))
+                found.append(parsed(text, self.stage.services.store.get))
             except ExerciseFileError as error:  # its arm is gone
                 logger.info("a teacher's page does without an exercise of its room: %s", error)
         activity.kept = tuple(found)
@@ -265,7 +265,7 @@ class Teacher(Member):
     def _arms(self) -> list[SmallArm]:
         arms = []
         for seat in self.room.seats:
-            state = decoded(seat.page, self.page.store.robots) if seat.page else PageState()
+            state = decoded(seat.page, self.page.services.store.robots) if seat.page else PageState()
             robot = self._robot(state)
             if robot is not None and state.q is not None:
                 found = standing(seat, self.room)
@@ -276,7 +276,7 @@ class Teacher(Member):
     def _robot(self, state: PageState) -> Robot | None:
         if state.own is not None and state.own.robot.id == state.robot:
             return state.own.robot
-        return next((robot for robot in self.page.store.robots if robot.id == state.robot), None)
+        return next((robot for robot in self.page.services.store.robots if robot.id == state.robot), None)
 
     # Member
 
@@ -294,8 +294,8 @@ class Teacher(Member):
         return shared(replace(self.page.snapshot(), own=self._shown_own()), self.page.features)
 
     def _shown_own(self) -> OwnArm | None:
-        own = self.page.own
-        return own if own is not None and own.robot.id == self.page.now.robot.id else None
+        own = self.page.robots.own
+        return own if own is not None and own.robot.id == self.page.arm.robot.id else None
 
     def refusal(self, act: str) -> str:
         if self._wall is not None:
@@ -320,7 +320,7 @@ class Teacher(Member):
         armed = self.is_armed(("remove", self._picked))
         one = views.seat_html(room, self._seat(self._picked), self.leader, armed, exercises, sent)
         tools = views.tools_html(room, self._wall is not None, self.is_armed("sweep"))
-        form = views.task_html(room, task, exercises, self._chosen, self.page.units)
+        form = views.task_html(room, task, exercises, self._chosen, self.page.display.units)
         question = views.ask_html(room, QUESTION, CHOICES), views.poll_html(room.poll, teacher=True)
         folders = {
             "Join": [views.join_html(room, now())],

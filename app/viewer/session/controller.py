@@ -1,7 +1,7 @@
 """The controller of one visitor's arm: robot, configuration, target, task, locked joints, and inverse kinematics.
 
-The controller owns the arm in the scene and the gizmo. It knows neither the panel nor the status line; what the
-rest of the page must know, it reports to an :class:`~app.viewer.session.listener.ArmListener`.
+The controller owns the arm in the scene and the gizmo. It knows neither the panel nor the status line: what the
+rest of the page must know or say, it reports to an :class:`~app.viewer.session.listener.ArmListener`.
 
 Two configurations are kept apart. `goal` is where the arm is heading: every answer of inverse kinematics and every
 slider sets it at once, and it is the seed of the next solve. `q` is what the scene shows: it eases towards the
@@ -26,6 +26,7 @@ import kin
 from app.shared.metrics import SOLVE_SECONDS
 from app.viewer.arm import Arm
 from app.viewer.panel import Post
+from app.viewer.panel.status import BY_HAND, Notice
 from app.viewer.scene import gizmo
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import Drawing
@@ -186,29 +187,32 @@ class ArmController:
 
     # Motions
 
-    def move_to(self, q: Array, ease: bool = True, dragged: int | None = None) -> None:
-        """Move to a configuration ``(n,)``; the target follows the tool."""
+    def move_to(
+        self, q: Array, notice: Notice | None = None, at_once: bool = False, dragged: int | None = None
+    ) -> None:
+        """Move to a configuration ``(n,)``; the target follows the tool, and the status shows `notice`.
+
+        The motion is eased unless `at_once`: between two configurations, easing takes the tool off its target.
+        """
         self.target = None
-        self._head_for(q, ease, dragged)
+        self._head_for(q, not at_once, dragged)
         self._release_branch()
+        self._listener.on_move(notice or BY_HAND, at_once)
 
-    def move_home(self) -> None:
-        """Move to the home configuration."""
-        self.move_to(self.robot.q_home)
-
-    def move_to_random(self) -> None:
-        """Move to a random configuration within the limits that is clear of pedestal and floor, if one is found.
+    def random_q(self) -> Array:
+        """A random configuration ``(n,)`` within the limits that is clear of pedestal and floor, if one is found.
 
         Locked joints stay where they are.
         """
         drawn = np.where(self.locks, self.goal, self.robot.random_q(self._rng, RANDOM_DRAWS))
-        self.move_to(next((q for q in drawn if self.scene.contact_at(q) is None), drawn[0]))
+        clear: Array = next((q for q in drawn if self.scene.contact_at(q) is None), drawn[0])
+        return clear
 
-    def move_joint(self, index: int, value: float, held: bool = True) -> None:
+    def move_joint(self, index: int, value: float, held: bool = True, notice: Notice | None = None) -> None:
         """Set one joint (rad or m); `held`: with its slider, which is not moved then."""
         q = self.goal.copy()
         q[index] = value
-        self.move_to(q, dragged=index if held else None)
+        self.move_to(q, notice, dragged=index if held else None)
 
     def slide_along(self, q: Array) -> None:
         """Move to a configuration ``(n,)`` of a self-motion: the branch stays, the target follows the tool."""
@@ -223,10 +227,6 @@ class ArmController:
             self.scene.place_gizmo(target)
         self._head_for(q)
 
-    def recall_target(self) -> None:
-        """Move the target back to the tool."""
-        self.move_to(self.goal)
-
     def _head_for(self, q: Array, ease: bool = True, dragged: int | None = None) -> None:
         self._motion.aim(q, time.perf_counter(), ease and self._pace.eases)
         self._listener.on_goal(dragged)
@@ -235,8 +235,7 @@ class ArmController:
         """A joint moved by hand may leave the requested branch; the request is dropped then."""
         # Computed only if a branch was requested: an arm without a closed form has no branch names.
         if self.branch not in (None, "seed") and self.branch != kin.branch_of(self.robot, self.goal):
-            self.branch = None
-            self._listener.on_branch(None)
+            self.set_branch(None)
 
     def restore(
         self, q: Array, target: Array | None, task: Task, branch: str | None, locks: Sequence[bool]
@@ -322,6 +321,18 @@ class ArmController:
         self.locks = tuple(locks)
         self._request_changed()
 
+    def change_lock(self, joint: int | None, lock: bool) -> None:
+        """Lock or unlock one joint, or all of them, at the value it is heading for."""
+        joints = range(self.robot.n) if joint is None else (joint,)
+        locks = tuple(lock if i in joints else before for i, before in enumerate(self.locks))
+        self._listener.on_lock(locks)
+        self.set_locks(locks)
+
+    def set_branch(self, branch: str | None) -> None:
+        """Request a branch from the next target on."""
+        self.branch = branch
+        self._listener.on_branch(branch)
+
     def switch_branch(self, branch: str | None) -> bool:
         """Request a branch and move to it, with the tool where its target is.
 
@@ -339,8 +350,7 @@ class ArmController:
 
     def allow_any_branch(self) -> None:
         """Drop the request for a branch, and solve again."""
-        self.branch = None
-        self._listener.on_branch(None)
+        self.set_branch(None)
         self._request_changed()
 
     def _request_changed(self) -> None:

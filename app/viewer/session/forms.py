@@ -4,35 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 
-from app.viewer.activity.activity import Activity
-from app.viewer.arm import Arm
 from app.viewer.declared.panel import Buttons, Control, Html, Node, PanelView
+from app.viewer.feature import Stage
 from app.viewer.labels import TEXT_SIZES
 from app.viewer.panel import Post
-from app.viewer.panel.fence import Fence
 from app.viewer.panel.layout import Panel
 from app.viewer.scene.viewpoints import SIDES
-from app.viewer.session.choices import PageChoices, ViewState
+from app.viewer.session.choices import PageChoices
 from app.viewer.views.templates import render
 from kin import InputError, Robot
-from kin.units import Units
-
-
-class FormsPage(Protocol):
-    """What forms show of a page."""
-
-    units: Units
-    view: ViewState
-    fence: Fence
-    activity: Activity
-
-    @property
-    def now(self) -> Arm:
-        """The arm as it is now."""
 
 
 class Forms:
@@ -46,7 +30,7 @@ class Forms:
     """
 
     def __init__(
-        self, gui: viser.GuiApi, panel: Panel, page: FormsPage, detailed: Sequence[Robot], post: Post
+        self, gui: viser.GuiApi, panel: Panel, page: Stage, detailed: Sequence[Robot], post: Post
     ) -> None:
         self._page, self._post = page, post
         self._nodes: dict[str, Sequence[Node]] = {
@@ -62,10 +46,10 @@ class Forms:
 
     def show(self) -> None:
         """Show what the page has chosen."""
-        choices, now, units = self._choices, self._page.now, self._page.units
+        choices, robot, units = self._choices, self._page.arm.robot, self._page.display.units
         for place, view in self._views.items():
             nodes = [*self._nodes[place], *(self._language() if place == "view" else ())]
-            view.show(nodes, choices, now.robot, units)
+            view.show(nodes, choices, robot, units)
 
     def read(self, place: str, path: str, serial: int, posted: object) -> PageChoices:
         """The choices with what a control has sent; for what it does not offer, it shows the present one again.
@@ -88,13 +72,14 @@ class Forms:
             return ()
         spec: Any = PageChoices.spec("view.language")
         offered = {name: code for code, name in lessons.languages.items()}
-        chosen = lessons.spoken(self._page.view.language)
+        chosen = lessons.spoken(self._page.display.view.language)
         return [Control("view.language", spec=spec.narrowed(offered), value=chosen)]
 
     @property
     def _choices(self) -> PageChoices:
-        page = self._page
-        return PageChoices(not page.units.degrees, page.units.length, page.now.task, page.view)
+        display = self._page.display
+        units, task = display.units, self._page.arm.task
+        return PageChoices(not units.degrees, units.length, task, display.view)
 
     def _forward(self, place: str, key: Hashable, value: object) -> None:
         match key:

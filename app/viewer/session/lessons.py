@@ -102,9 +102,14 @@ class LessonChoice:
     def _show(self, chosen: type[Feature] | None, steps: dict[str, object] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
         activity, always = self._stage.activity, (self.exercises, self.courses, self.author, self.reviewing)
-        if chosen is not None and issubclass(chosen, Lesson) and chosen.by_rows and self._stage.now.robot.coupled:
+        if (
+            chosen is not None
+            and issubclass(chosen, Lesson)
+            and chosen.by_rows
+            and self._stage.arm.now.robot.coupled
+        ):
             assign(self._choice, NONE)
-            self._overview = add_html(self._gui, _not_for(chosen, self._stage.now.robot) + self._list())
+            self._overview = add_html(self._gui, _not_for(chosen, self._stage.arm.now.robot) + self._list())
             chosen = None
         elif chosen is None:
             self._overview = add_html(self._gui, self._list())
@@ -222,7 +227,7 @@ class LessonChoice:
 
     def _kept(self, lesson: str) -> dict[str, object] | None:
         """The progress in a lesson about the arm on show, or about the last one if it does not ask about this."""
-        robot = self._stage.now.robot
+        robot = self._stage.arm.now.robot
         asked = arm_for(self._stage.activity.text(lesson), robot) == robot
         kept = [
             state for (key, arm), state in self._left.items() if key == lesson and (arm == robot.id or not asked)

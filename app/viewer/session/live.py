@@ -99,16 +99,16 @@ class LiveInput:
     def _use_robot(self, given: Robot | Mapping[str, Any]) -> None:
         page = self._page
         if isinstance(given, Robot):
-            if given != page.now.robot:
-                page.change_robot(given)
+            if given != page.arm.robot:
+                page.robots.show(given)
         else:
             own = own_arm(given)
-            if page.own is None or own.robot != page.own.robot or own.robot != page.now.robot:
-                page.show_own(own)
+            if page.robots.own is None or own.robot != page.robots.own.robot or own.robot != page.arm.robot:
+                page.robots.show_own(own)
         self._say("Another arm")
 
     def _use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
-        self._page.use_obstacles(obstacles)
+        self._page.arm.use_obstacles(obstacles)
         self._say("Other obstacles")
 
     def _use_program(self, program: Program) -> None:
@@ -123,21 +123,21 @@ class LiveInput:
         return next(each for each in self._page.features if isinstance(each, ProgramTab))
 
     def _use_q(self, q: Array) -> None:
-        robot = self._page.now.robot
+        robot = self._page.arm.robot
         q = robot.check_q(q)
         if not robot.in_limits(q, slack=1e-6):
             raise InputError("q", np.asarray(q).tolist(), "a configuration within the limits of the arm on show")
-        self._page.move_to(robot.clip(q), Notice("hand", f"Joints moved by {self._name}"), at_once=True)
+        self._page.arm.move_to(robot.clip(q), Notice("hand", f"Joints moved by {self._name}"), at_once=True)
 
     def _use_target(self, target: tuple[Array, bool]) -> None:
         T, oriented = target
         if not oriented:
             T = T.copy()
-            T[:3, :3] = self._page.now.aim[:3, :3]
-        self._page.set_target(T)
+            T[:3, :3] = self._page.arm.now.aim[:3, :3]
+        self._page.arm.set_target(T)
 
     def _say(self, what: str) -> None:
-        self._page.notify(Notice("hand", f"{what} from {self._name}"))
+        self._page.status.show(Notice("hand", f"{what} from {self._name}"))
 
     # What it hears
 
@@ -151,7 +151,7 @@ class LiveInput:
                 self._plays = False
                 self._tab.start(False)
             return
-        line.use_robot(page.now.robot)
+        line.use_robot(page.arm.robot)
         if line.program is None:
             self._done.clear()
             return

@@ -15,7 +15,6 @@ from app.viewer.scene.camera import Sphere
 from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.choices import ViewState
 from app.viewer.session.parts import Page
-from kin.transforms import Array
 from kin.units import Units
 
 
@@ -32,13 +31,13 @@ class Looks:
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "body": self.use_library,
-            "system-dark": lambda dark: self.use_colours(page.view.dark, bool(dark)),
-            "camera": lambda _: page.camera.aim(page.arm.scene.body, self._frames(), glide=True),
+            "system-dark": lambda dark: self.use_colours(page.display.view.dark, bool(dark)),
+            "camera": lambda _: page.camera.aim(page.arm.scene.body, page.arm.now.goal_points, True),
             "fit-arm": self._fit,
             "look-from": self._look_from,
             "resized": self._on_resize,
             "looked": self._on_look,  # the viewpoint is read when the camera rests
-            "frame": lambda name: page.use_frames(page.frames.choose(name)),
+            "frame": lambda name: page.display.use_frames(page.display.frames.choose(name)),
             "gripper": lambda value: page.arm.scene.open_gripper(share_of(value)),
             "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
         }
@@ -46,10 +45,10 @@ class Looks:
     def use_units(self, units: Units) -> None:
         """Show all numbers in these units."""
         page = self._page
-        page.units = units
+        page.display.units = units
         page.forms.show()
         page.status.use(units)
-        page.renew_sliders()
+        page.joints.renew()
         page.posture.show()
         page.arm.scene.floor.use_units(units)
         page.numbers.use_pose()
@@ -58,21 +57,22 @@ class Looks:
     def use_colours(self, dark: bool | None, system_dark: bool) -> None:
         """Make the page dark or light; None: as the visitor's system is."""
         page = self._page
-        before = page.dark
-        page.view, page.system_dark = replace(page.view, dark=dark), system_dark
-        if page.dark != before:
-            configure_theme(page.client.gui, page.dark)
+        display, before = page.display, page.display.dark
+        display.view, display.system_dark = replace(display.view, dark=dark), system_dark
+        if display.dark != before:
+            configure_theme(page.client.gui, display.dark)
             page.for_features(lambda feature: feature.on_style())
             self.apply()
 
     def use_view(self, view: ViewState) -> None:
         """Show the page and the scene as `view` says."""
         page = self._page
-        before, page.view = page.view, replace(view, dark=page.view.dark)
+        display, before = page.display, page.display.view
+        display.view = replace(view, dark=before.dark)
         if view.base_axes != before.base_axes:
             page.arm.use_base_axes(view.base_axes)
         if view.dark != before.dark:
-            self.use_colours(view.dark, page.system_dark)
+            self.use_colours(view.dark, display.system_dark)
         if view.detailed != page.bodies.detailed:
             page.bodies.detailed, page.bodies.last_refusal = view.detailed, ""
             self.redraw_body()
@@ -89,7 +89,7 @@ class Looks:
     def redraw_body(self) -> None:
         """Draw the body of the arm on show anew."""
         page = self._page
-        page.arm.scene.use_drawing(page.bodies.of(page.arm.robot, page.own))
+        page.arm.scene.use_drawing(page.bodies.of(page.arm.robot, page.robots.own))
         self.apply()
 
     def use_library(self, why: str) -> None:
@@ -104,15 +104,15 @@ class Looks:
 
     def apply(self) -> None:
         """Show the scene as the page's view says."""
-        page, scene = self._page, self._page.arm.scene
-        page.arm.avoid_collisions(page.view.avoid)
-        scene.show_as(page.view.look)
+        page, scene, display = self._page, self._page.arm.scene, self._page.display
+        page.arm.avoid_collisions(display.view.avoid)
+        scene.show_as(display.view.look)
         page.panel.gripper.offer(scene.opened)
-        scene.show_frames(page.view.frames)
-        scene.show_labels(page.view.labels)
-        scene.show_axes(page.view.axes)
-        scene.floor.use_dark(page.dark)
-        scene.floor.use_units(page.units)
+        scene.show_frames(display.view.frames)
+        scene.show_labels(display.view.labels)
+        scene.show_axes(display.view.axes)
+        scene.floor.use_dark(display.dark)
+        scene.floor.use_units(display.units)
 
     # What the visitor does
 
@@ -120,7 +120,7 @@ class Looks:
         """Show the whole arm, and what there is of a program, obstacles and clouds."""
         found: list[Sphere] = []
         self._page.for_features(lambda feature: found.extend(feature.extents()))
-        self._page.camera.look_at_arm(self._frames(), found)
+        self._page.camera.look_at_arm(self._page.arm.now.goal_points, found)
 
     def _on_resize(self, _: object) -> None:
         self._page.camera.refit()
@@ -128,24 +128,19 @@ class Looks:
 
     def _on_look(self, _: object) -> None:
         self._page.arm.scene.size_gizmo(self._page.camera.small)
-        self._page.place_scale()
+        self._page.picture.place_scale()
 
     def _look_from(self, side: object, _: object = None) -> None:
         if side not in SIDES:
             raise kin.InputError("look-from", side, "one of " + ", ".join(SIDES))
-        self._page.camera.look_from(side, self._frames())
-
-    def _frames(self) -> Array:
-        """Origins ``(n, 3)`` of the frames of the arm where it is heading."""
-        frames: Array = kin.link_frames(self._page.now.robot, self._page.now.goal)[:, :3, 3]
-        return frames
+        self._page.camera.look_from(side, self._page.arm.now.goal_points)
 
     def _on_view(self, place: str, path: str, serial: int, value: object) -> None:
         page = self._page
-        before, chosen = page.view, page.forms.read(place, path, serial, value)
-        if chosen.units != page.units:
+        before, chosen = page.display.view, page.forms.read(place, path, serial, value)
+        if chosen.units != page.display.units:
             self.use_units(chosen.units)
         if chosen.view != before:
             self.use_view(chosen.view)
         if chosen.view.avoid != before.avoid:
-            page.solve_again()
+            page.arm.solve_again(page.status.shows_result)

@@ -6,61 +6,37 @@ They are updated after the scene, and at most once per interval, because that ta
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import Protocol
-
-import viser
+from collections.abc import Callable, Sequence
 
 import kin
-from app.viewer.activity.activity import Activity
-from app.viewer.feature import Feature
-from app.viewer.frames import FrameAxes, Frames
+from app.viewer.feature import Stage
+from app.viewer.frames import FrameAxes
 from app.viewer.obstacles.words import sentence
-from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
-from app.viewer.panel.status import StatusLine, key_number
+from app.viewer.panel.status import key_number
 from app.viewer.scene.gizmo import travel
 from app.viewer.scene.key_number import KeyNumber
-from app.viewer.scene.motion import Pace
-from app.viewer.session.controller import ArmController
 from app.viewer.session.posture import PosturePanel
 from kin import IKResult
 from kin.axes import inverse
 from kin.collision import Contact
 from kin.frames import WORLD
 from kin.transforms import Array
-from kin.units import Units
 
 FRAME_AXES = 0.16  # length of the axes of a workpiece, in radii of the sphere around the arm
-
-
-class NumbersPage(Protocol):
-    """The parts of a page whose numbers these are."""
-
-    client: viser.ClientHandle
-    arm: ArmController
-    panel: Panel
-    posture: PosturePanel
-    sliders: JointSliders
-    status: StatusLine
-    units: Units
-    frames: Frames
-    activity: Activity
-
-    def for_features(self, action: Callable[[Feature], None]) -> None:
-        """Call every feature."""
 
 
 class Numbers:
     """The numbers of one page. Not thread-safe: the visitor's worker calls it.
 
     Args:
-        pace: says how many seconds there are between two updates.
+        touched: called with what the arm touches when that has changed, the deepest contact first.
     """
 
-    def __init__(self, page: NumbersPage, pace: Pace) -> None:
-        self._page = page
-        self._pace = pace
+    def __init__(
+        self, page: Stage, panel: Panel, posture: PosturePanel, touched: Callable[[Sequence[Contact]], None]
+    ) -> None:
+        self._page, self._panel, self._posture, self._touched = page, panel, posture, touched
         self._pose_due = self._sliders_due = False
         self._updated_at = 0.0
         self._dragged: int | None = None  # the joint whose slider the visitor holds
@@ -73,8 +49,8 @@ class Numbers:
         """The page has other frames, or another arm."""
         arm = self._page.arm
         shown = arm.scene.body
-        self._axes.show(self._page.frames, arm.robot, FRAME_AXES * shown.radius, shown.mount.aside)
-        self._page.panel.readout.show_frames(self._page.frames)
+        self._axes.show(self._page.display.frames, arm.robot, FRAME_AXES * shown.radius, shown.mount.aside)
+        self._panel.readout.show_frames(self._page.display.frames)
         self._pose_due = True
 
     def use_pose(self) -> None:
@@ -90,7 +66,7 @@ class Numbers:
         arm = self._page.arm
         if arm.target is not None:
             self._beside_target.show(
-                key_number(result, self._page.units), arm.target[:3, 3], arm.scene.body.radius
+                key_number(result, self._page.display.units), arm.target[:3, 3], arm.scene.body.radius
             )
 
     def use_drag(self, start: Array, target: Array | None) -> None:
@@ -99,7 +75,7 @@ class Numbers:
             self._travel.hide()
         else:
             radius = self._page.arm.scene.body.radius
-            self._travel.show(travel(start, target, self._page.units), target[:3, 3], radius)
+            self._travel.show(travel(start, target, self._page.display.units), target[:3, 3], radius)
 
     def hide_target(self) -> None:
         """There is no target."""
@@ -111,7 +87,7 @@ class Numbers:
         """Seconds until the next update; None if no number is out of date."""
         if not (self._pose_due or self._sliders_due):
             return None
-        return max(0.0, self._updated_at + self._pace.reading - time.perf_counter())
+        return max(0.0, self._updated_at + self._page.services.pace.reading - time.perf_counter())
 
     def update(self) -> None:
         """Update the numbers that are out of date, if it is time."""
@@ -128,8 +104,8 @@ class Numbers:
                 self._show_pose(kin.fk(arm.robot, arm.q), arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False
-                page.sliders.show(arm.goal, self._dragged)
-                page.posture.show()
+                page.joints.sliders.show(arm.goal, self._dragged)
+                self._posture.show()
 
     def _show_contacts(self) -> str:
         """Paint what touches; returns the sentence about it, or ""."""
@@ -137,13 +113,13 @@ class Numbers:
         page.arm.scene.colors.show(contacts)
         if contacts != self._contacts:
             self._contacts = contacts
-            page.for_features(lambda feature: feature.on_contacts(contacts))
-        return sentence(contacts, page.units)
+            self._touched(contacts)
+        return sentence(contacts, page.display.units)
 
     def _show_pose(self, tool: Array, target: Array | None) -> None:
         """Show the pose of the tool, and of a target that it has missed, in the frame of the read-out."""
-        page, frames = self._page, self._page.frames
+        page, frames = self._page, self._page.display.frames
         if frames.shown != WORLD:
             T = inverse(frames.pose(page.arm.robot, page.arm.q))
             tool, target = T @ tool, None if target is None else T @ target
-        page.panel.readout.show(tool, page.units, target, frames.shown, page.activity.withheld)
+        self._panel.readout.show(tool, page.display.units, target, frames.shown, page.activity.withheld)

@@ -13,8 +13,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import replace
 
-from app.exports.snippets import LOCAL, Moment, Service
-from app.shared.security import Rights
+from app.exports.snippets import Moment
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice
@@ -27,7 +26,6 @@ from app.viewer.session.state import (
     KEY_RETURN,
     PageState,
     StoredPage,
-    encode,
     opened_with,
     read_stored_page,
     write,
@@ -44,9 +42,7 @@ class Persistence:
     """Saves and restores one page. Not thread-safe: the visitor's worker calls it.
 
     Args:
-        token: whether programs must send an access token.
         guard: runs an action that may fail; the rest is restored in any case.
-        rights: what the visitor may cause: some may be shown a stored state only as far as nothing is computed.
 
     Attributes:
         stored: what `load` has read.
@@ -58,19 +54,13 @@ class Persistence:
         led: whether another page leads this one, which adds no entries to the browser's history then.
     """
 
-    def __init__(
-        self, page: Page, token: bool, guard: Callable[[Callable[[], None]], None], rights: Rights
-    ) -> None:
+    def __init__(self, page: Page, guard: Callable[[Callable[[], None]], None]) -> None:
         self._page = page
-        self._token = token
         self._guard = guard
-        self._rights = rights
-        self._address = LOCAL
         self.stored = PageState()
         self.system_dark = False
         self.text_size = "Normal"
         self.embedded = self.shown = ""
-        self._saved = ""
         self._left_out: tuple[str, ...] = ()  # of the saved state
         self._state = PageState()
         self._opened: Hashable = None  # of the saved state, as `LessonChoice.opened`
@@ -79,11 +69,6 @@ class Persistence:
         self._since: float | None = None  # when the first act was that is not saved
         self.led = False
 
-    @property
-    def service(self) -> Service:
-        """The service, at the address that the browser has for it."""
-        return Service(self._address, self._token)
-
     def load(self) -> None:
         """Read the stored state from the browser, and wait for it. A page that does not answer starts fresh."""
         try:
@@ -91,14 +76,15 @@ class Persistence:
         except (CancelledError, TimeoutError):  # page gone, no answer
             log.debug("visitor %s has no stored state", self._page.client.client_id)
             stored = StoredPage()
-        self._address = stored.address or LOCAL
+        if stored.address:
+            self._page.links.service = replace(self._page.links.service, address=stored.address)
         self.system_dark, self.text_size, self.embedded = stored.dark, stored.text_size, stored.embedded
         self._page.activity.review.zone = stored.zone
         if stored.shown:
             self.shown = stored.shown
             SHOWN.join(stored.shown, self._page.post)
-        saved = opened_with(stored, self._page.store.robots)
-        if self._rights.compute:
+        saved = opened_with(stored, self._page.services.store.robots)
+        if self._page.rights.compute:
             self.stored = saved
             return
         lesson = lesson_with_key(saved.lesson)
@@ -108,13 +94,13 @@ class Persistence:
     def restore(self, saved: PageState) -> None:
         """Apply the rest of a state to a page that shows its robot; what cannot be applied is reported."""
         page = self._page
-        page.use_obstacles(saved.obstacles)
+        page.arm.use_obstacles(saved.obstacles)
         if saved.locks:
-            page.set_locks([i in saved.locks for i in range(page.now.robot.n)])
-        if saved.task not in (None, page.now.task):
-            page.set_task(saved.task)
+            page.arm.set_locks([i in saved.locks for i in range(page.arm.robot.n)])
+        if saved.task not in (None, page.arm.task):
+            page.arm.set_task(saved.task)
         if saved.branch is not None:
-            page.set_branch(saved.branch)
+            page.arm.set_branch(saved.branch)
         target, lesson, camera = saved.target, saved.lesson, saved.camera
         if target is not None:
             self._guard(lambda: page.arm.restore_target(target, saved.q))
@@ -125,23 +111,23 @@ class Persistence:
                 state = saved.features[feature.key]
                 self._guard(lambda feature=feature, state=state: feature.restore(state))  # type: ignore[misc]
         bare = saved.q is None and not saved.features.keys() & {lesson, "guide"}
-        if lesson is not None and (bare or page.lessons.misplaced) and self._rights.compute:
+        if lesson is not None and (bare or page.lessons.misplaced) and self._page.rights.compute:
             self._guard(page.lessons.begin)  # such a link leaves arm and drawing to the step
         if camera is not None:  # after the lessons, which may move it too
             self._guard(lambda: page.camera.restore(camera))
-        elif page.now.target is not None:  # it may be far out of reach
-            page.keep_in_view(page.now.target[:3, 3])
+        elif page.arm.target is not None:  # it may be far out of reach
+            page.picture.keep_in_view(page.arm.target[:3, 3])
         notice = link_notice(saved)
         if notice is not None:
-            page.notify(notice)
+            page.status.show(notice)
 
     def begin(self, share: SharePanel) -> str:
         """Take the present state as saved, and return it; from now on `share` offers the saved state."""
         self._share = share
         self._state = self.snapshot()
-        self._saved, self._opened = self._written(self._state), self._page.lessons.opened
+        self._page.links.saved, self._opened = self._written(self._state), self._page.lessons.opened
         self._update_share()
-        return self._saved
+        return self._page.links.saved
 
     def postpone(self, now: float) -> bool:
         """The visitor did something: wait for the next rest. Returns whether to `save` before it."""
@@ -172,9 +158,9 @@ class Persistence:
         self._page.camera.look()
         state = self.snapshot()
         text, self._opened = self._written(state), self._page.lessons.opened
-        if text != self._saved:
+        if text != self._page.links.saved:
             replaces = self.led or (key != KEY_RETURN and same(state, self._state))
-            self._saved, self._state = text, state
+            self._page.links.saved, self._state = text, state
             self._page.channel.notify(KEY_REPLACE if replaces else key, text)
             if state.lesson is not None and not self._page.activity.practice.seated:
                 self._page.channel.notify(KEY_LAST, text)
@@ -187,7 +173,7 @@ class Persistence:
         if left_out != self._left_out:
             self._left_out = left_out
             if left_out:
-                self._page.notify(too_long(left_out, {one.key: one.title for one in self._page.features}))
+                self._page.status.show(too_long(left_out, {one.key: one.title for one in self._page.features}))
         return text
 
     def snapshot(self) -> PageState:
@@ -195,49 +181,37 @@ class Persistence:
         page = self._page
         states = {feature.key: feature.state() for feature in page.features}
         return PageState(
-            robot=page.now.robot.id,
-            own=page.own,
-            frames=page.frames,
-            obstacles=page.now.obstacles,
-            q=page.now.goal,
+            robot=page.arm.robot.id,
+            own=page.robots.own,
+            frames=page.display.frames,
+            obstacles=page.arm.obstacles,
+            q=page.arm.goal,
             target=page.arm.open_target,
-            task=page.now.task,
-            branch=page.now.branch,
+            task=page.arm.task,
+            branch=page.arm.branch,
             lesson=page.activity.lesson,
-            units=page.units,
-            view=page.view,
+            units=page.display.units,
+            view=page.display.view,
             features={key: state for key, state in states.items() if state},
             locks=tuple(i for i, lock in enumerate(page.arm.locks) if lock),
             camera=page.camera.chosen,
         )
 
-    @property
-    def link(self) -> str:
-        """A link to the page as it was last saved."""
-        return f"{self._address}viewer/#s={self._saved}"
-
-    def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
-        """A link to a page with nothing but these states of features, at this lesson."""
-        return f"{self._address}viewer/#s={encode(PageState(lesson=lesson, features=features))}"
-
     def _update_share(self) -> None:
-        arm = self._page.now
-        page = self._page
-        target = arm.aim
-        own = page.own is not None and page.own.robot == arm.robot
-        avoid = page.view.avoid
+        page, arm = self._page, self._page.arm.now
+        own = page.robots.own is not None and page.robots.own.robot == arm.robot
         moment = Moment(
             arm.robot,
             arm.goal,
-            target,
+            arm.aim,
             arm.task,
-            self._address,
-            self._token,
+            page.links.service.address,
+            page.links.service.token,
             own,
             arm.obstacles,
-            avoid,
+            page.display.view.avoid,
         )
-        self._share.show(self.link, moment, "table" in page.activity.withheld)
+        self._share.show(page.links.page, moment, "table" in page.activity.withheld)
 
 
 def too_long(left_out: Sequence[str], titles: Mapping[str, str]) -> Notice:

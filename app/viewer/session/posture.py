@@ -36,7 +36,7 @@ class PosturePanel:
     def use_robot(self) -> None:
         """Show the choices of another robot."""
         with self._folder:
-            self._choice = BranchChoice(self._stage.client.gui, self._stage.now.robot, self._post)
+            self._choice = BranchChoice(self._stage.client.gui, self._stage.arm.now.robot, self._post)
         self.show()
 
     def remove(self) -> None:
@@ -46,13 +46,13 @@ class PosturePanel:
 
     def show(self) -> None:
         """Show the arm's branch, and the redundancy parameters there."""
-        robot = self._stage.now.robot
+        robot = self._stage.arm.now.robot
         parameters = self._parameters()
         self._asked = "postures" in self._stage.activity.withheld
         self._choice.withhold(self._asked)
         if kin.branch_names(robot) and not self._asked:
-            self._choice.show(kin.branch_of(robot, self._stage.now.goal))
-        self._sliders.show(parameters, robot, self._stage.units, self._dragged)
+            self._choice.show(kin.branch_of(robot, self._stage.arm.now.goal))
+        self._sliders.show(parameters, robot, self._stage.display.units, self._dragged)
         self._dragged = None
 
     def use_activity(self) -> None:
@@ -65,7 +65,7 @@ class PosturePanel:
         best = result.best
         # In other tasks the parameter may be a turn about the target's axis, which is not the tool's axis until
         # the arm has arrived.
-        if self._stage.now.task == "pose" and result.status == "solved" and best is not None:
+        if self._stage.arm.now.task == "pose" and result.status == "solved" and best is not None:
             self._result = self._request(), best
         else:
             self._result = None
@@ -77,14 +77,14 @@ class PosturePanel:
     def not_here(self, branch: str) -> Notice:
         """Why the arm cannot take a posture with the tool where it is."""
         stage = self._stage
-        robot, q, options = stage.now.robot, stage.now.goal, replace(stage.now.options, branch=branch)
+        robot, q, options = stage.arm.now.robot, stage.arm.now.goal, replace(stage.arm.now.options, branch=branch)
         if robot.n < 6 and options.task == "pose":  # its postures are those of point and approach direction
             options = replace(options, task="approach")
         T = kin.fk(robot, q)
         result = solve(robot, T[:3, 3] if options.task == "position" else T, options, q)
         why = "No joint values give this posture with the tool where it is."
         if result.violations:
-            needs = listed([need(violation, stage.units) for violation in result.violations])
+            needs = listed([need(violation, stage.display.units) for violation in result.violations])
             why = f"It needs {needs}."
         elif result.status == "solved":
             why = "With it the tool would have another roll."
@@ -101,7 +101,7 @@ class PosturePanel:
     def read_text(self, name: str, text: str) -> float:
         """A typed value of a redundancy parameter, in screen units; raises `EntryError` for an invalid one."""
         shown = self._sliders.read_text(name, text)
-        units = self._stage.units
+        units = self._stage.display.units
         value = units.angles.read(shown)
         found = next((r for r in self._parameters() if r.name == name), None)
         slack = 0.5 * units.angles.read(units.angles.step(1))  # the ends are shown rounded
@@ -138,12 +138,12 @@ class PosturePanel:
 
     def _self_motion(self, name: str, value: float) -> IKResult:
         """Solve for the tool's present pose with a redundancy parameter set."""
-        arm = self._stage.now
+        arm = self._stage.arm.now
         return self_motion(arm.robot, arm.T_goal, arm.options, arm.goal, name, value)
 
     def _parameters(self) -> tuple[Redundancy, ...]:
         """The redundancy parameters at the goal, on the branch of the goal."""
-        arm = self._stage.now
+        arm = self._stage.arm.now
         if self._result is not None and self._result[0] == self._request():
             return self._result[1].redundancy
         seed = "seed" if kin.branch_names(arm.robot) else None
@@ -152,5 +152,5 @@ class PosturePanel:
         return found.solutions[0].redundancy if found.solutions else found.redundancy
 
     def _request(self) -> tuple[object, ...]:
-        arm = self._stage.now
+        arm = self._stage.arm.now
         return arm.robot.id, arm.task, arm.goal.tobytes(), arm.options.constraints

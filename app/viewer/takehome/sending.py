@@ -14,13 +14,23 @@ OPEN = Notice("advice", "Not now", "The page would contain what the open questio
 def send_page(stage: Stage, motion: Motion | None = None) -> None:
     """Download the arm as it is, with the postures of its target and, if there is one, a motion to play."""
     if stage.activity.withheld:
-        stage.notify(OPEN)
+        stage.status.show(OPEN)
         return
-    arm = stage.now
+    arm = stage.arm.now
     robot = named(arm.robot)
-    drawn = stage.bodies.of(arm.robot, stage.own)
+    drawn = stage.bodies.of(arm.robot, stage.robots.own)
     page = web_page(
-        SavedArm(robot, arm.goal, drawn, arm.aim, arm.options, motion, stage.units, stage.link, arm.obstacles)
+        SavedArm(
+            robot,
+            arm.goal,
+            drawn,
+            arm.aim,
+            arm.options,
+            motion,
+            stage.display.units,
+            stage.links.page,
+            arm.obstacles,
+        )
     )
     words = "It needs no server: open it from a disk, send it, or put it into a learning platform."
     save_file(stage, f"{robot.id}.html", page, words)

@@ -66,7 +66,7 @@ class Worksheets(DeclaredFeature[Settings, Facts[Settings]]):
                 send_page(self.stage)
             case (str(name), int()) if name in FILES and self.hides("table"):
                 words = "The worksheet would contain the table that the open exercise asks for."
-                self.stage.notify(Notice("advice", "Not now", words))
+                self.stage.status.show(Notice("advice", "Not now", words))
             case (str(name), int()) if name in FILES:
                 sheet = self.sheet()
                 suffix, write = FILES[name]
@@ -85,15 +85,17 @@ class Worksheets(DeclaredFeature[Settings, Facts[Settings]]):
         """The worksheet for the arm as it is, or for the one that the lesson asks about."""
         stage, lesson = self.stage, self._lesson
         if lesson is None:
-            return Sheet("The arm at a configuration", stage.now.robot, stage.now.goal, stage.units)
+            return Sheet(
+                "The arm at a configuration", stage.arm.now.robot, stage.arm.now.goal, stage.display.units
+            )
         text = stage.activity.text(lesson.key)
-        robot = arm_for(text, stage.now.robot)
-        here, found = robot == stage.now.robot, lesson.outline_in(robot, stage.units, text)
+        robot = arm_for(text, stage.arm.now.robot)
+        here, found = robot == stage.arm.now.robot, lesson.outline_in(robot, stage.display.units, text)
         return Sheet(
             lesson.title if found.text is None else found.text.title or lesson.title,
             robot,
-            stage.now.goal if here else robot.q_home,
-            stage.units,
+            stage.arm.now.goal if here else robot.q_home,
+            stage.display.units,
             found.goal,
             parts_of(found),
             lesson.formulas() if here else (),

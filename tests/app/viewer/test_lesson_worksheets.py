@@ -145,7 +145,8 @@ def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions()
 
 @pytest.fixture
 def worksheets():
-    stage = MagicMock(now=Arm(PIONEER, PIONEER.q_home, PIONEER.q_home), units=DEFAULT_UNITS)
+    stage = MagicMock()
+    stage.arm.now, stage.display.units = Arm(PIONEER, PIONEER.q_home, PIONEER.q_home), DEFAULT_UNITS
     lesson = SimpleNamespace(key="dh", formulas=tuple, left=lambda robot: "table")
     made = Worksheets(stage, lesson, MagicMock())
     made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)

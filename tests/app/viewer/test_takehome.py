@@ -212,13 +212,15 @@ class FakeStage:
     """What *Web page* uses of a page."""
 
     def __init__(self, arm: Arm, withheld: frozenset[str] = frozenset()) -> None:
-        self.now, self.own, self.units, self.link = arm, None, DEFAULT_UNITS, "https://arms.example/viewer/#s=x"
+        self.arm, self.robots = SimpleNamespace(now=arm), SimpleNamespace(own=None)
+        self.display = SimpleNamespace(units=DEFAULT_UNITS)
+        self.links = SimpleNamespace(page="https://arms.example/viewer/#s=x")
         self.activity = SimpleNamespace(withheld=withheld)
         self.bodies = SimpleNamespace(of=lambda robot, own: drawing(robot))
         self.files: list[tuple[str, bytes]] = []
         self.notices: list[Notice] = []
         self.client = SimpleNamespace(send_file_download=lambda name, data, **_: self.files.append((name, data)))
-        self.notify = self.notices.append
+        self.status = SimpleNamespace(show=self.notices.append)
 
 
 def test_the_visitor_gets_the_arm_on_show_with_its_link():

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +19,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer import lessons
-from app.viewer.feature import Feature
+from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Option, Outline, Step
 from app.viewer.panel import listen
@@ -28,6 +30,7 @@ from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
+VIEWER = Path(__file__).parents[3] / "app" / "viewer"
 STORE = Store()
 PIONEER, OTHER = STORE.get("pioneer5"), STORE.get("puma560")
 
@@ -42,7 +45,7 @@ class Witness(Feature):
 
     def __init__(self, stage):
         super().__init__(stage)
-        self.note("made", stage.now.robot.id)
+        self.note("made", stage.arm.now.robot.id)
         listen(stage.client.gui.add_slider(self.title, 0, 10, 1, 0), self.post, "slider")
 
     def note(self, *call):
@@ -56,20 +59,20 @@ class Witness(Feature):
         if value == 8:
             self.due = 0.01
         if value == 7:
-            self.stage.move_to(self.stage.now.robot.lower)
+            self.stage.arm.move_to(self.stage.arm.now.robot.lower)
 
     def on_robot(self):
-        self.note("robot", self.stage.now.robot.id)
+        self.note("robot", self.stage.arm.now.robot.id)
 
     def on_pose(self, T_base_tool):
-        assert np.allclose(T_base_tool, kin.fk(self.stage.now.robot, self.stage.now.q))
+        assert np.allclose(T_base_tool, kin.fk(self.stage.arm.now.robot, self.stage.arm.now.q))
         self.note("pose")
 
     def on_result(self, result):
         self.note("result", result.status)
 
     def on_style(self):
-        self.note("style", self.stage.units, self.stage.dark)
+        self.note("style", self.stage.display.units, self.stage.display.dark)
 
     def tick(self, now):
         self.note("tick")
@@ -180,3 +183,11 @@ def test_every_lesson_has_a_short_description() -> None:
 def test_keys_and_titles_are_unique() -> None:
     features = [*lessons.LESSONS, *page.TABS]
     assert len({f.key for f in features}) == len({f.title for f in features}) == len(features)
+
+
+def test_features_get_the_parts_of_the_page_and_use_each_of_them():
+    methods = {name for name, value in vars(Stage).items() if callable(value) and not name.startswith("_")}
+    assert methods == {"post", "open_choice"}, "what a part can do stands in its class"
+    sources = [path.read_text(encoding="utf-8") for path in VIEWER.rglob("*.py") if "session" not in path.parts]
+    used = {name for source in sources for name in re.findall(r"\b_?stage\.(\w+)", source)}
+    assert {*Stage.__annotations__, *methods} <= used

@@ -56,11 +56,11 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         super().__init__(stage)
 
     def started(self) -> None:
-        robot = self.stage.now.robot
+        robot = self.stage.arm.now.robot
         size = body(robot).size
         self._measured, self._axes = FigureNodes(size), FigureNodes(size)
-        self.stage.see_through(True)
-        self.stage.fit_view(room(robot))
+        self.stage.arm.scene.see_through(True)
+        self.stage.camera.fit(room(robot))
         self._camera.forget()
         self._aim()
 
@@ -73,13 +73,13 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
     def remove(self) -> None:
         super().remove()
         self._camera.restore()
-        self.stage.see_through(False)
-        self.stage.fit_view(())
+        self.stage.arm.scene.see_through(False)
+        self.stage.camera.fit(())
 
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, s, units, robot = self.read, self.settings, self.stage.units, self.read.robot
+        f, s, units, robot = self.read, self.settings, self.stage.display.units, self.read.robot
         asked = self.hides("motions")
         first, nine = Control("assign"), Html(views.nine_steps_html, (robot.convention,), key="nine")
         if s.assign is not None:
@@ -109,7 +109,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         ]
 
     def scene(self) -> Sequence[SceneNode | Lazy]:
-        f, s, units = self.facts, self.settings, self.stage.units
+        f, s, units = self.facts, self.settings, self.stage.display.units
         if s.assign is not None:
             return assign_drawing.scene(s.assign, f.q, self._axes, units)
         nodes = drawing.walk(f, self.read, self._measured, units, self.hides("motions"))
@@ -137,13 +137,13 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
             case ("choose", str(part), int()):
                 attempt.choose(part, value)
             case ("check", int()):
-                attempt.check(value, self.stage.now.q, self.stage.units)
+                attempt.check(value, self.stage.arm.now.q, self.stage.display.units)
             case ("show", int()):
                 attempt.show()
             case ("back", int()):
                 attempt.back()
             case ("restart", int()):
-                attempt = Attempt.begun(self.stage.now.robot)
+                attempt = Attempt.begun(self.stage.arm.now.robot)
             case _:
                 raise InputError("lesson", key, "a control of its block")
         self.change(assign=attempt)
@@ -158,7 +158,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
 
     def on_play(self) -> None:
         """Go on by itself, from the base if it was at the end."""
-        if self.settings.at >= length(self.stage.now.robot):
+        if self.settings.at >= length(self.stage.arm.now.robot):
             self.change(at=0.0)
         self.change(plays=True, rest=0.0)
 
@@ -167,13 +167,13 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         self.change(plays=False)
 
     def _go(self, at: int) -> None:
-        self.change(plays=False, at=float(min(max(at, 0), length(self.stage.now.robot))))
+        self.change(plays=False, at=float(min(max(at, 0), length(self.stage.arm.now.robot))))
 
     def running(self) -> Sequence[Sweep]:
         return [Sweep(self._walk, FRAME)] if self.settings.plays else []
 
     def _walk(self, seconds: float) -> None:
-        arm, s = self.stage.now, self.settings
+        arm, s = self.stage.arm.now, self.settings
         at, rest = walked(arm.robot, arm.q, s.at, s.rest, s.speed, seconds)
         self.change(at=at, rest=rest, plays=at < length(arm.robot))
 
@@ -185,6 +185,6 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
 
     def _aim(self) -> None:
         if self._compares:
-            self._camera.show(self.stage.now.robot)
+            self._camera.show(self.stage.arm.now.robot)
         else:
             self._camera.restore()

@@ -43,7 +43,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
     left: ClassVar[Left] = "pose"
 
     def running(self) -> Sequence[Work]:
-        robot, own = self.stage.now.robot, self.stage.own
+        robot, own = self.stage.arm.now.robot, self.stage.robots.own
         edited = own is not None and own.robot == robot  # which the visitor may still be editing
         return [Work("book", book_later, (robot,), rest=AFTER_EDIT if edited else 0.0)]
 
@@ -52,7 +52,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         if not isinstance(error, DerivationError):
             super().worked(key)
         elif not isinstance(error, NotDerivedError):
-            self.stage.notify(Notice("error", "No equations for this arm", str(error)))
+            self.stage.status.show(Notice("error", "No equations for this arm", str(error)))
 
     def state(self) -> dict[str, object]:
         self.invalidate()
@@ -66,7 +66,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, units = self.read, self.stage.units
+        f, units = self.read, self.stage.display.units
         nodes: list[Node] = [Html(views.message, (f.about,), key="about")]
         book, equation = f.book, f.equation
         test, symbols = list[Node](), list[Node]()
@@ -86,7 +86,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
 
     def _equation(self, f: EquationsFacts) -> list[Node]:
         """The equation on show, and its values."""
-        book, equation, units = f.book, f.equation, self.stage.units
+        book, equation, units = f.book, f.equation, self.stage.display.units
         assert book is not None
         assert equation is not None
         options = {views.label(e): e.id for e in book.equations}
@@ -109,14 +109,14 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
 
     def on_worst(self) -> None:
         """Move the arm to where the misprint shows most."""
-        f, units = self.facts, self.stage.units
+        f, units = self.facts, self.stage.display.units
         equation = f.equation
         if equation is None or not equation.worst:
             return
         error = units.distance(f.largest) if equation.is_length else units.angle(f.largest)
         detail = f"As printed, {equation.entry} is off by {error} here."
         notice = Notice("hand", f"Equation ({equation.number}) at its worst", detail)
-        self.stage.move_to(np.array(equation.worst), notice)
+        self.stage.arm.move_to(np.array(equation.worst), notice)
 
 
 def _misprint(f: EquationsFacts) -> list[SceneNode]:

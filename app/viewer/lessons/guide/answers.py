@@ -21,7 +21,7 @@ class Answers:
 
     def __init__(self, stage: Stage, lesson: type[Lesson]) -> None:
         self._stage, self._lesson = stage, lesson
-        self.arm = arm_for(stage.activity.text(lesson.key), stage.now.robot)
+        self.arm = arm_for(stage.activity.text(lesson.key), stage.arm.now.robot)
         self.progress = Progress(self._outline())
         self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
         self._arms: dict[Robot, Progress] = {self.arm: self.progress}
@@ -85,7 +85,7 @@ class Answers:
         drawn = [list(one) for one in self.drawn]
         return {
             **self.progress.state(),
-            **({} if self.arm.id == self._stage.now.robot.id else {"arm": self.arm.id}),
+            **({} if self.arm.id == self._stage.arm.now.robot.id else {"arm": self.arm.id}),
             **({"earlier": drawn} if drawn else {}),
         }
 
@@ -93,7 +93,7 @@ class Answers:
         """Take what `state` returned; invalid entries are ignored."""
         arm = state.get("arm")
         if isinstance(arm, str) and arm in self.arm_ids and arm != self.arm.id:
-            self.ask_about(self._stage.store.get(arm))
+            self.ask_about(self._stage.services.store.get(arm))
         exercises = self._stage.activity.courses.exercises
         self._earlier[self.progress] = earlier.read(state.get("earlier"), exercises)
         self._ask_earlier()
@@ -102,7 +102,7 @@ class Answers:
     def _ask_earlier(self) -> None:
         """Let the check ask what was chosen of earlier lessons, in the reader's units."""
         exercises = self._stage.activity.courses.exercises
-        self.progress.ask_also(earlier.questions(self.drawn, exercises, self._stage.units))
+        self.progress.ask_also(earlier.questions(self.drawn, exercises, self._stage.display.units))
 
     def _use(self, outline: Outline) -> None:
         """Go on with an outline; with one of another text, as far as the answers fit its questions."""
@@ -113,4 +113,4 @@ class Answers:
 
     def _outline(self) -> Outline:
         text = self._stage.activity.text(self._lesson.key)
-        return self._lesson.outline_in(self.arm, self._stage.units, text)
+        return self._lesson.outline_in(self.arm, self._stage.display.units, text)

@@ -74,11 +74,11 @@ class ExampleView:
             return
         self._player = self._drawing = self._left = None
         self._scene.remove()
-        self._stage.show_all()
+        self._stage.picture.show_all()
 
     def on_pose(self) -> bool:
         """The visitor's arm moves: who moves it wants to see it; returns whether the example has ended."""
-        if self._left is None or (self._left == self._stage.now.goal).all():
+        if self._left is None or (self._left == self._stage.arm.now.goal).all():
             return False
         self.close()
         return True
@@ -102,7 +102,7 @@ class ExampleView:
 
     def _example(self) -> Example:
         assert self._text is not None
-        return example_of(self._text, self._stage.units)
+        return example_of(self._text, self._stage.display.units)
 
     def _begin(self, now: float) -> None:
         example = self._example()
@@ -112,8 +112,8 @@ class ExampleView:
         view = View.of(np.array(eye.position), np.array(eye.look_at), aspect)
         self._drawing = ExampleDrawing(example, view)
         notice = Notice("hand", f"Worked example: {example.title}", "Your own arm is hidden, and stays as it is.")
-        self._left = self._stage.now.goal.copy()
-        self._stage.show_alone(f"/{KEY}-", notice)
+        self._left = self._stage.arm.now.goal.copy()
+        self._stage.picture.show_alone(f"/{KEY}-", notice)
 
     def _show(self) -> None:
         player, drawing = self._player, self._drawing
@@ -123,4 +123,4 @@ class ExampleView:
         q = step.at(share)
         walk = step.walk[0] + share * (step.walk[1] - step.walk[0])
         behind = step.way[: max(1, round(share * (len(step.way) - 1)) + 1)]
-        self._scene.show(drawing.nodes(q, step.drawn, behind, walk, self._stage.units))
+        self._scene.show(drawing.nodes(q, step.drawn, behind, walk, self._stage.display.units))

@@ -161,7 +161,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         framed = next((key for key, asked in self._forms.items() if asked.form == "frame"), None)
         if framed is None:
             return self._answer_nodes()
-        reach = self.stage.now.robot.reach
+        reach = self.stage.arm.now.robot.reach
         return [*self._answer_nodes(), own_frame(self._sheet(framed).ghost, reach)]
 
     # Events
@@ -214,7 +214,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self._example.close()
         if self.is_asked:
             T = pose_from_position_wxyz(event.position, event.wxyz)
-            self._sheet(str(self._progress.at + 1)).drag(T, self.stage.units)
+            self._sheet(str(self._progress.at + 1)).drag(T, self.stage.display.units)
 
     @property
     def done(self) -> Hashable:
@@ -225,7 +225,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
     @property
     def is_asked(self) -> bool:
         """Whether that arm is on show: with another one the step can be read, and the lesson be explored."""
-        return self.stage.now.robot == self._answers.about
+        return self.stage.arm.now.robot == self._answers.about
 
     def step_name(self, key: Hashable) -> str:
         names = {
@@ -243,7 +243,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
     def on_robot(self) -> None:
         self._example.close()
         # Other numbers are asked on another arm, and answers stay with theirs.
-        robot = self.stage.now.robot
+        robot = self.stage.arm.now.robot
         if not self.is_asked and robot.id in self._answers.arm_ids:
             self._answers.ask_about(robot)
         self._sheets.clear()
@@ -289,13 +289,13 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         if self.settings.room is not None:
             self._see_through(False)
         if self.settings.joints:
-            self.stage.show_joints(None)
+            self.stage.joints.show_in(None)
         super().remove()
 
     def _take(self, state: dict[str, object]) -> None:
         """Take what `state` returned; invalid entries are ignored."""
         self._answers.restore(state)
-        self.settings = self.settings.restored(state, self.stage.now.robot)
+        self.settings = self.settings.restored(state, self.stage.arm.now.robot)
         self.change(misplaced=bool(state) and state.get("arm") is None and not self.is_asked)
         self._sheets.clear()
         self._follow_steps()
@@ -332,7 +332,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
             if form == "posture" and self.shown is not None:
                 given = self.shown.driven(question)
             else:
-                given = sheet.given(form, value, self.stage.units)
+                given = sheet.given(form, value, self.stage.display.units)
             verdict = progress.answer(key, question.read(given))
         except EntryError as error:
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)
@@ -378,7 +378,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
     def _wants_arm(self) -> bool:
         """Whether a question on show is about another arm, and no course wants this one here."""
         progress, item = self._progress, self.stage.activity.progress.item
-        here = "lesson", self._lesson.key, self.stage.now.robot.id
+        here = "lesson", self._lesson.key, self.stage.arm.now.robot.id
         if self.is_asked or (item is not None and (item.kind, item.key, item.robot) == here):
             return False
         asked = (key for key in progress.questions if key[0] not in "er" and self._is_on_show(key))
@@ -386,9 +386,9 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
 
     def _fetch_arm(self) -> None:
         """Show the arm that the step is about at its pose, and say so."""
-        left, about = self.stage.now.robot, self._answers.about
+        left, about = self.stage.arm.now.robot, self._answers.about
         if left != about:
-            self.stage.change_robot(about)
+            self.stage.robots.show(about)
             self._open_step(f"This is asked about {about.name}. Undo brings {left.name} back.")
 
     def _move_to_end(self, key: str) -> None:
@@ -405,13 +405,13 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
     def _show_pose(self, pose: Pose, words: str) -> None:
         steps, at = self._progress.outline.steps, self._progress.at
         title = "Check" if at == len(steps) else f"Step {at + 1}: {steps[at].title}"
-        self.stage.move_to(np.array(pose.q), Notice("hand", title, words))
+        self.stage.arm.move_to(np.array(pose.q), Notice("hand", title, words))
         if pose.drawing and self.shown is not None:
             self.shown.restore(dict(pose.drawing))
         if pose.target is not None:
-            self.stage.set_target(pose_from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
+            self.stage.arm.set_target(pose_from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
         self.change(target=None if pose.target is None else np.array(pose.target[:3]))
-        self.stage.keep_in_view(self.settings.target, self.settings.room)
+        self.stage.picture.keep_in_view(self.settings.target, self.settings.room)
 
     def _leading_on(self) -> Following | None:
         """The button to what comes after the lesson."""
@@ -446,7 +446,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         if not same((room,), (self.settings.room,)):
             self.change(room=room)
             self._see_through(bool(nodes))
-            self.stage.keep_in_view(self.settings.target, room)
+            self.stage.picture.keep_in_view(self.settings.target, room)
 
     @property
     def _open_questions(self) -> list[str]:
@@ -469,7 +469,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         steps, key = progress.outline.steps, str(progress.at + 1)
         if not self.is_asked or progress.at == len(steps):
             return ()
-        robot, step = self.stage.now.robot, steps[progress.at]
+        robot, step = self.stage.arm.now.robot, steps[progress.at]
         nodes = answer_nodes(robot, step, progress.given.get(key), progress.is_closed(key))
         if not nodes and step.guessed is not None and key not in progress.given:
             before = f"e{key}"
@@ -480,7 +480,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
     def _see_through(self, on: bool) -> None:
         """Let the arm hide nothing of an answer that is drawn."""
         if not self._lesson.through:
-            self.stage.see_through(on, gizmo=True)
+            self.stage.arm.scene.see_through(on, gizmo=True)
 
     def _ghost_room(self) -> Array:
         """The corners ``(n, 3)`` of a cube with the frame that is asked for: they tell how far, not which way."""

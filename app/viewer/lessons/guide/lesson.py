@@ -53,7 +53,7 @@ class Lesson(Feature):
 
     def driven(self, question: Question) -> object:
         """The answer to a question that is answered by driving the arm: by itself, where the arm is heading."""
-        return self.stage.now.goal.tolist()
+        return self.stage.arm.now.goal.tolist()
 
     @staticmethod
     def asked_of(robot: Robot, units: Units) -> LessonFacts | AskedFacts:

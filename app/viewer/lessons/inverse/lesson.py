@@ -63,23 +63,25 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         super().__init__(stage)
 
     def started(self) -> None:
-        if (own := self._arms.get(self.stage.now.robot)) is not None:
+        if (own := self._arms.get(self.stage.arm.now.robot)) is not None:
             self.change(q=own.q, signs=own.signs, taken=own.taken)
         self._figures = dict[StepKey, FigureNodes]()  # labels of one step take no room from those of another
         self.invalidate()
         f = self.facts
         if f.exists or self.settings.drawn:
-            self.stage.see_through(f.exists, gizmo=f.exists)
-            self.stage.fit_view(room(f.derived, f.followed.derivation, f.keys) if f.exists else ())
+            self.stage.arm.scene.see_through(f.exists, gizmo=f.exists)
+            self.stage.camera.fit(room(f.derived, f.followed.derivation, f.keys) if f.exists else ())
         self.change(drawn=f.exists)
 
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, units = self.read, self.stage.units
+        f, units = self.read, self.stage.display.units
         if not f.exists:
             arms = [
-                Button(self.stage.store.get(robot).name, self.event(self.on_arm, robot), ARM_HINT, key=robot)
+                Button(
+                    self.stage.services.store.get(robot).name, self.event(self.on_arm, robot), ARM_HINT, key=robot
+                )
                 for robot in texts_of(self.key).arms
             ]
             return [Html(views.others_html, (f.robot,), key="others"), *arms]
@@ -99,20 +101,20 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def scene(self) -> Sequence[Lazy]:
         f = self.read
-        return [Lazy("figure", self._shapes, (f, self.stage.units))] if f.exists else []
+        return [Lazy("figure", self._shapes, (f, self.stage.display.units))] if f.exists else []
 
     def _shapes(self, *args: object) -> Sequence[SceneNode]:
         """The figure of the step on show; the check has that of the whole posture."""
         f = self.read
         at = min(f.settings.step, len(f.keys) - 1)
         nodes = self._figures.setdefault(f.keys[at], FigureNodes(body(f.robot).size))
-        return figure(f.derived, f.followed.derivation, f.keys[at], nodes, self.stage.units, f.opened[at])
+        return figure(f.derived, f.followed.derivation, f.keys[at], nodes, self.stage.display.units, f.opened[at])
 
     # The steps
 
     def on_steps(self, progress: Progress) -> Outline | None:
         at, steps = progress.at, progress.outline.steps
-        if self.facts.robot is not self.stage.now.robot or (at < len(steps) and steps[at].about is not None):
+        if self.facts.robot is not self.stage.arm.now.robot or (at < len(steps) and steps[at].about is not None):
             return None  # the step is about another arm, whose derivation has other steps
         if self.settings.restart:
             progress.restart()
@@ -137,7 +139,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def _outline(self, before: Outline) -> Outline:
         """The outline with the questions about it, in the words of the one before."""
-        units = self.stage.units
+        units = self.stage.display.units
         asked = self.completed(outline_of(self._exercise, units, before.text), self.facts.robot, units)
         return replace(asked, unfit=before.unfit)
 
@@ -171,24 +173,24 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         """Move the arm to the branch that is followed, or say why it cannot go there."""
         branch = self.facts.followed
         if branch.available and branch.q is not None:
-            self.stage.move_to(branch.q, Notice("hand", f"Branch {branch.number}", branch.name))
+            self.stage.arm.move_to(branch.q, Notice("hand", f"Branch {branch.number}", branch.name))
             return
         reason = "it has no solution at this target"
         if branch.q is not None:
-            reason = views.outside_text(branch, self.stage.units)
+            reason = views.outside_text(branch, self.stage.display.units)
         title = f"Branch {branch.number} is not available"
-        self.stage.notify(Notice("limits", title, f"{reason.capitalize()}."))
+        self.stage.status.show(Notice("limits", title, f"{reason.capitalize()}."))
 
     def on_ask(self) -> None:
         """Ask about the pose that the arm has now."""
-        q = self.stage.now.goal
+        q = self.stage.arm.now.goal
         self.change(q=as_configuration(q), signs=signs_of(self.facts.derived, q), restart=True)
         self.stage.activity.changed()
-        self.stage.notify(Notice("hand", "New questions", "They are about the pose that the arm has now."))
+        self.stage.status.show(Notice("hand", "New questions", "They are about the pose that the arm has now."))
 
     def on_arm(self, robot: str) -> None:
         """Show one of the lesson's arms."""
-        self.stage.change_robot(self.stage.store.get(robot))
+        self.stage.robots.show(self.stage.services.store.get(robot))
 
     def changed(self, path: str) -> None:
         if path == "psi":
@@ -213,5 +215,5 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     def remove(self) -> None:
         super().remove()
         if self.settings.drawn:
-            self.stage.see_through(False)
-            self.stage.fit_view(())
+            self.stage.arm.scene.see_through(False)
+            self.stage.camera.fit(())

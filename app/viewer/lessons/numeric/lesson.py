@@ -46,16 +46,16 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
     undo: ClassVar[dict[str, str]] = {"on_take": "Iterate"}
 
     def started(self) -> None:
-        self._figure = FigureNodes(body(self.stage.now.robot).size)
+        self._figure = FigureNodes(body(self.stage.arm.now.robot).size)
 
     def remove(self) -> None:
         super().remove()
-        self.stage.fit_view(())
+        self.stage.camera.fit(())
 
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, s, done, units = self.read, self.settings, self.read.iterated, self.stage.units
+        f, s, done, units = self.read, self.settings, self.read.iterated, self.stage.display.units
         outcome, course = [], []
         if done is not None:
             words = done.problem, done.run, done.solutions, units
@@ -83,7 +83,7 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
         ]
 
     def _basins(self) -> list[Node]:
-        f, units = self.read, self.stage.units
+        f, units = self.read, self.stage.display.units
         if f.basins is None:
             return [Html(views.waiting_html, (self.settings.picture,), key="waiting")]
         nodes: list[Node] = [Html(views.basins_html, (f.basins, f.pictured.robot.name, units), key="picture")]
@@ -106,7 +106,7 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     def on_target(self) -> None:
         """Aim at the present target, or at where the tool is."""
-        self.change(target=tuple(self.stage.now.aim.ravel().tolist()))
+        self.change(target=tuple(self.stage.arm.now.aim.ravel().tolist()))
 
     def on_move(self, name: str) -> None:
         """Show another iterate, or play them."""
@@ -133,10 +133,10 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
         q = basins.within(f.robot, f.iterated.run.q[f.number])
         if q is None:
             title = f"Iterate {f.number} is outside the limits"
-            self.stage.notify(Notice("limits", title, "The arm stays where it is."))
+            self.stage.status.show(Notice("limits", title, "The arm stays where it is."))
             return
         self.change(start=tuple(f.iterated.run.q[0].tolist()))
-        self.stage.move_to(q, Notice("hand", f"Iterate {f.number}", "The start stays where it was."))
+        self.stage.arm.move_to(q, Notice("hand", f"Iterate {f.number}", "The start stays where it was."))
 
     # Iterating
 
@@ -163,4 +163,4 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
         if not s.fits:  # the view does not follow the iterates
             self.change(fits=True)
             frames = kin.link_frames(found.problem.robot, found.run.q)
-            self.stage.fit_view((), frames[..., :3, 3].reshape(-1, 3))
+            self.stage.camera.fit((), frames[..., :3, 3].reshape(-1, 3))

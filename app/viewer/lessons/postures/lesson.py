@@ -136,16 +136,16 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         name = short(posture.name)
         if posture.available and posture.q is not None:
             words = f"Posture {index + 1}: {name}"
-            self.stage.move_to(posture.q, Notice("hand", words, "The tool stays where it was."))
+            self.stage.arm.move_to(posture.q, Notice("hand", words, "The tool stays where it was."))
         else:
-            self.stage.notify(Notice("limits", f"Not available: {name}", f"{posture.words.capitalize()}."))
+            self.stage.status.show(Notice("limits", f"Not available: {name}", f"{posture.words.capitalize()}."))
 
     def on_way_point(self, index: int) -> None:
         """Move the arm to a point of the way round."""
         points = loop.loop_of(self.read.robot)
         assert points is not None
         words = "The joints go straight there from where they are."
-        self.stage.move_to(points[index], Notice("hand", f"Way point {index + 1}", words))
+        self.stage.arm.move_to(points[index], Notice("hand", f"Way point {index + 1}", words))
 
     def on_ghost(self, index: int, show: bool) -> None:
         """Show or hide the ghost of a posture."""
@@ -158,29 +158,29 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         remedy = self.read.offers[number]
         match remedy.kind:
             case "branch":
-                self.stage.allow_any_branch()
+                self.stage.arm.allow_any_branch()
             case "unlock":
-                self.stage.unlock(remedy.joint)
+                self.stage.arm.change_lock(remedy.joint, False)
             case "relax":
                 assert remedy.task is not None
-                self.stage.set_task(remedy.task)
+                self.stage.arm.set_task(remedy.task)
             case "turn" | "move":
                 assert remedy.q is not None
                 title = "Target turned" if remedy.kind == "turn" else "Target moved"
-                self.stage.move_to(remedy.q, Notice("hand", title, "The tool can reach it there."))
+                self.stage.arm.move_to(remedy.q, Notice("hand", title, "The tool can reach it there."))
 
     def on_result(self, result: IKResult) -> None:
         self.change(result=result)
         super().on_result(result)
 
     def started(self) -> None:
-        now = self.stage.now
+        now = self.stage.arm.now
         self.change(drive=loop.driven(now.robot, None, now.q) if self.settings.round else None)
 
     def on_pose(self, T_base_tool: Array) -> None:
         if self.settings.round and not self._outdated:
             before = self.settings.drive
-            drive = loop.driven(self.stage.now.robot, before, self.stage.now.q)
+            drive = loop.driven(self.stage.arm.now.robot, before, self.stage.arm.now.q)
             if drive is not before:
                 self.change(drive=drive)
         super().on_pose(T_base_tool)
@@ -197,7 +197,7 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
     def driven(self, question: Question) -> object:
         if not isinstance(question, loop.Round):
             return super().driven(question)
-        now = self.stage.now
+        now = self.stage.arm.now
         drive = loop.driven(now.robot, self.settings.drive, now.goal)
         return (now.goal[None] if drive is None else drive.corners).round(6).tolist()
 
@@ -210,7 +210,7 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         if f.result is not None and f.result.status != "solved":
             works.append(Work("remedies", self._remedies, (f.result, f.units), rest=QUIET))
         if f.round:
-            works.append(Work("map", self.stage.summaries.postures, (loop.request(f.robot),), poll=POLL))
+            works.append(Work("map", self.stage.services.summaries.postures, (loop.request(f.robot),), poll=POLL))
         return works
 
     def _cone(self, T: Array) -> Cone:

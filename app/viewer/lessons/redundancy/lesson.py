@@ -57,7 +57,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, item, units = self.read, self.read.item, self.stage.units
+        f, item, units = self.read, self.read.item, self.stage.display.units
         nodes = [*self.unless_asked("null space", Html(views.idea_html, (f.idea,)))]
         if item is not None:
             nodes += self._controls(item)
@@ -136,7 +136,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
     # The motion
 
     def _on_side(self, item: Redundancy) -> Redundancy:
-        return on_side_of(self.settings.side, item, self.stage.units.angles)
+        return on_side_of(self.settings.side, item, self.stage.display.units.angles)
 
     def _range(self) -> tuple[float, float] | None:
         found = None if self.facts.item is None else range_of(self.facts.item)
@@ -192,7 +192,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         q = self._led(item, value) if f.numeric else self._solved(item, value)
         if q is None or float(np.abs(q - f.held.q).max()) > SMOOTH:
             if f.numeric and s.target is not None:
-                self.stage.notify(BLOCKED)
+                self.stage.status.show(BLOCKED)
             self.change(up=not s.up, target=None)
             return
         if f.numeric:
@@ -200,17 +200,17 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         arrived = abs(goal - value) < NEAR
         notice = s.arrival if arrived else MOVING
         self.change(held=replace(f.held, q=q), target=None if arrived else s.target, side=value)
-        self.stage.move_to(q, notice, at_once=True)
+        self.stage.arm.move_to(q, notice, at_once=True)
 
     def _solved(self, item: Redundancy, value: float) -> Array | None:
         """The configuration for a value of an exact parameter."""
-        arm, held = self.stage.now, self.facts.held
+        arm, held = self.stage.arm.now, self.facts.held
         result = self_motion(arm.robot, held.T, arm.options, held.q, item.name, value)
         return np.array(result.solutions[0].q) if result.solutions else None
 
     def _led(self, item: Redundancy, value: float) -> Array | None:
         """The configuration near the present one in which a joint of the null space has a value."""
-        arm, held, locked = self.stage.now, self.facts.held, self.facts.locked
+        arm, held, locked = self.stage.arm.now, self.facts.held, self.facts.locked
         joint = int(item.name.removeprefix("theta")) - 1
         near = within(arm.robot, held.q, arm.task, joint, value, locked)
         return lead(arm.robot, held.q, held.T, arm.task, joint, near, locked)

@@ -51,8 +51,8 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
     )
 
     def started(self) -> None:
-        self._figure = FigureNodes(body(self.stage.now.robot).size)
-        self.stage.fit_view([room(self.stage.now.robot)])
+        self._figure = FigureNodes(body(self.stage.arm.now.robot).size)
+        self.stage.camera.fit([room(self.stage.arm.now.robot)])
 
     def restore(self, state: dict[str, object]) -> None:
         self.change(turning=None)
@@ -60,12 +60,12 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
 
     def remove(self) -> None:
         super().remove()
-        self.stage.fit_view([])
+        self.stage.camera.fit([])
 
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, s, units = self.read, self.settings, self.stage.units
+        f, s, units = self.read, self.settings, self.stage.display.units
         uses = {"Set": self.on_set, "From tool": self.on_from_tool, "To target": self.on_to_target}
         turned = {name: self.event(self.on_turn, *which) for name, which in TURNS.items()}
         at = None if s.turning is None else s.turning.turn
@@ -116,7 +116,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         return [Lazy("frames", self._frames, (shown,))]
 
     def _frames(self, shown: RotationsSettings) -> list[SceneNode]:
-        return frames(RotationsFacts(shown, self.stage.now), self._figure, self.event(self.on_turn, 0, 2))
+        return frames(RotationsFacts(shown, self.stage.arm.now), self._figure, self.event(self.on_turn, 0, 2))
 
     # Events
 
@@ -142,25 +142,25 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
 
     def on_from_tool(self) -> None:
         self.change(error="")
-        self._turn_to(self.stage.now.T_goal[:3, :3])
+        self._turn_to(self.stage.arm.now.T_goal[:3, :3])
 
     def on_to_target(self) -> None:
         self.change(error="")
-        T = self.stage.now.aim.copy()
+        T = self.stage.arm.now.aim.copy()
         T[:3, :3] = self.facts.R
-        self.stage.set_target(T)
+        self.stage.arm.set_target(T)
 
     def on_set(self) -> None:
         self.change(error="")
         try:
-            self._turn_to(read_rotation(self.settings.typed, self.facts.convention, self.stage.units))
+            self._turn_to(read_rotation(self.settings.typed, self.facts.convention, self.stage.display.units))
         except EntryError as error:
             self.change(error=f"{error.title}: {error.detail}")
 
     def on_add(self) -> None:
         s = self.settings
         if len(s.chain) == MOST:
-            self.stage.notify(Notice("error", "The chain is full", f"It has room for {MOST} motions."))
+            self.stage.status.show(Notice("error", "The chain is full", f"It has room for {MOST} motions."))
             return
         turns, axis = MOTIONS[s.motion]
         self._chain((*s.chain, Motion(turns, axis, s.turn if turns else s.shift, s.own)))

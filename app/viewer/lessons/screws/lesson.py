@@ -512,20 +512,20 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
     settings_of, facts_of, asked_of = ScrewsSettings, ScrewsFacts, ScrewsAsked
 
     def started(self) -> None:
-        self._figure = FigureNodes(body(self.stage.now.robot).size)
-        self.stage.see_through(True)
+        self._figure = FigureNodes(body(self.stage.arm.now.robot).size)
+        self.stage.arm.scene.see_through(True)
         center, radius = round_points(tips(self.facts))
-        self.stage.fit_view([(center, LABELS * radius)])
+        self.stage.camera.fit([(center, LABELS * radius)])
 
     def remove(self) -> None:
         super().remove()
-        self.stage.see_through(False)
-        self.stage.fit_view([])
+        self.stage.arm.scene.see_through(False)
+        self.stage.camera.fit([])
 
     def panel(self) -> Sequence[Node]:
         f, s, robot = self.read, self.settings, self.read.robot
         value = float(f.q[f.chosen])
-        one = robot, f.chosen, f.columns[:, f.chosen], value, s.form, self.stage.units
+        one = robot, f.chosen, f.columns[:, f.chosen], value, s.form, self.stage.display.units
         table = Html(table_html, (robot, f.columns, s.form, f.now, f.chosen))
         acting = Html(product_html, (robot, f.zero, f.acting, s.factors, s.form))
         return [
@@ -540,7 +540,7 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
 
     def scene(self) -> Sequence[Lazy]:
         # Axes at zero do not move with the arm.
-        facts, units = self.facts if self.facts.now else self.read, self.stage.units
+        facts, units = self.facts if self.facts.now else self.read, self.stage.display.units
         return [Lazy("screws", scene, (facts, self._figure, units, self.hides("screws")))]
 
     def legend(self) -> str:

@@ -65,7 +65,7 @@ class TrajectoriesLesson(DeclaredFeature[TrajectoriesSettings, TrajectoriesFacts
         return [Control("paths")]
 
     def scene(self) -> Sequence[Lazy]:
-        return [Lazy("ways", self._ways, (self.stage.now.robot,))] if self.settings.paths else []
+        return [Lazy("ways", self._ways, (self.stage.arm.now.robot,))] if self.settings.paths else []
 
     def _ways(self, robot: Robot) -> list[SceneNode]:
         """Both ways of the tool, which do not depend on the configuration."""

@@ -47,7 +47,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
     # What is shown
 
     def panel(self) -> Sequence[Node]:
-        f, s, robot, units = self.read, self.settings, self.stage.now.robot, self.stage.units
+        f, s, robot, units = self.read, self.settings, self.stage.arm.now.robot, self.stage.display.units
         columns = {str(k + 1): self.event(self.on_column, k) for k in range(robot.n)}
         return [
             *self.unless_asked(
@@ -115,7 +115,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         if kind is None:
             return Html(str)
         scale = scale_of(robot, kind)
-        return Html(views.ellipsoid_html, (robot, kind, f.semi, scale, truncated(f), self.stage.units))
+        return Html(views.ellipsoid_html, (robot, kind, f.semi, scale, truncated(f), self.stage.display.units))
 
     def _statics(self, f: VelocityFacts) -> Html:
         if not self.settings.statics.on:
@@ -139,17 +139,17 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         self.change(joint=None if joint == self.settings.joint else joint)
 
     def on_jog(self, axis: int, sign: int) -> None:
-        stage, arm, s = self.stage, self.stage.now, self.settings
+        stage, arm, s = self.stage, self.stage.arm.now, self.settings
         amount = sign * (s.step if axis < 3 else s.turn)
-        request = (arm.robot, arm.goal.tobytes(), arm.options, axis, amount, s.frame, stage.units)
+        request = (arm.robot, arm.goal.tobytes(), arm.options, axis, amount, s.frame, stage.display.units)
         if request == s.refused:
             return
-        made = step(arm.robot, arm.goal, arm.options, axis, amount, s.frame, stage.units)
+        made = step(arm.robot, arm.goal, arm.options, axis, amount, s.frame, stage.display.units)
         if made.q is None:
             self.change(refused=request)
-            stage.notify(made.notice)
+            stage.status.show(made.notice)
         else:
-            stage.move_to(made.q, made.notice)
+            stage.arm.move_to(made.q, made.notice)
 
     def on_step_out(self) -> None:
         """Offer the ways out in the status card."""
@@ -162,13 +162,15 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
 
     def on_tip(self, pull: DragEvent) -> None:
         if pull.phase != "start":
-            self._push([x / force_scale(self.stage.now.robot) for x in pull.position])
+            self._push([x / force_scale(self.stage.arm.now.robot) for x in pull.position])
 
     def on_line_start(self) -> None:
-        self.change(start=self.stage.now.goal, plot=section_views.note_html(section_views.HERE))
+        self.change(start=self.stage.arm.now.goal, plot=section_views.note_html(section_views.HERE))
 
     def on_line_plot(self) -> None:
-        self.change(plot=section_views.plot_html(self.stage.now, self.settings.start, self.stage.units))
+        self.change(
+            plot=section_views.plot_html(self.stage.arm.now, self.settings.start, self.stage.display.units)
+        )
 
     def refresh(self) -> None:
         """Show what is declared; the picture contains the arrows of lost directions, or else the arm alone."""
@@ -176,7 +178,7 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         super().refresh()
         ends = self._lost_ends()
         if not np.array_equal(ends, before):
-            self.stage.keep_in_view(None, ends)
+            self.stage.picture.keep_in_view(None, ends)
 
     def _lost_ends(self) -> Array:
         """Where the arrows of lost directions end that are drawn ``(n, 3)``."""
@@ -187,17 +189,17 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
 
     def _move(self, seconds: float) -> None:
         """A frame of the motion in the null space; another motion of the arm ends it."""
-        arm, motion = self.stage.now, self.settings.motion
+        arm, motion = self.stage.arm.now, self.settings.motion
         if motion is None:
             motion = arm.goal, arm.T_goal
         made = after(*motion, self.facts, seconds) if np.array_equal(motion[0], arm.goal) else None
         if isinstance(made, tuple):
             self.change(motion=made)
-            self.stage.move_to(made[0], MOVING, at_once=True)
+            self.stage.arm.move_to(made[0], MOVING, at_once=True)
             return
         self.change(runs=False, motion=None)
         if made is not None:
-            self.stage.notify(made)
+            self.stage.status.show(made)
 
     def _push(self, force: Sequence[float]) -> None:
         """Show this force, within the limits."""

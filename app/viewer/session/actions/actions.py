@@ -152,7 +152,7 @@ class Actions:
     def _travel(self, text: object) -> None:
         """Go to the state of an entry in the browser's history."""
         page = self._page
-        state = decode(text, page.store.robots) if isinstance(text, str) else PageState(unreadable=True)
+        state = decode(text, page.services.store.robots) if isinstance(text, str) else PageState(unreadable=True)
         if (notice := link_notice(state)) is not None:
             page.status.show(notice)
             return
@@ -170,12 +170,12 @@ class Actions:
         page = self._page
         self._gesture, self._live_until = None, 0.0
         self.history.arrive()
-        if state.units != page.units:
+        if state.units != page.display.units:
             self._looks.use_units(state.units)
-        if state.frames != page.frames:
-            page.use_frames(state.frames)
-        page.use_obstacles(state.obstacles)
-        if state.view != page.view:
+        if state.frames != page.display.frames:
+            page.display.use_frames(state.frames)
+        page.arm.use_obstacles(state.obstacles)
+        if state.view != page.display.view:
             self._looks.use_view(state.view)
         self.adopt(state)
         if state.lesson != page.activity.lesson:

@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 import kin
-from app.viewer.panel.status import Notice, introduction
-from app.viewer.session.actions.typed import BY_HAND, TypedInput
+from app.viewer.panel.status import BY_HAND, Notice, introduction
+from app.viewer.session.actions.typed import TypedInput
 from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.parts import Page
-from app.viewer.session.robots import robot_of
 from app.viewer.session.state import PageState
 from kin.ik import Task
+from kin.transforms import Array
 from kin.units import Units
 
 
@@ -38,65 +38,61 @@ class ArmControls:
             "robot": self._on_robot_choice,
             "find": self._on_find,
             "task": self._on_task,
-            "home": lambda _: self._move_into_view(arm.move_home, "Home configuration"),
-            "random": lambda _: self._move_into_view(arm.move_to_random, "Random configuration"),
-            "recall": lambda _: self._move(arm.recall_target, "The target is at the tool"),
-            "shown": lambda moved: page.move_to(moved[0], moved[1], True),
+            "home": lambda _: self._move_into_view(arm.robot.q_home, "Home configuration"),
+            "random": lambda _: self._move_into_view(arm.random_q(), "Random configuration"),
+            "recall": lambda _: self._move(arm.goal, "The target is at the tool"),
+            "shown": lambda moved: arm.move_to(moved[0], moved[1], at_once=True),
         }
 
     def adopt(self, state: PageState) -> None:
         """Show the arm of another state: robot, requests and configuration."""
         page = self._page
-        changed, page.own = state.own != page.own, state.own
-        robot = robot_of(page, state.robot)
-        if robot != page.now.robot:
-            page.change_robot(robot, state.q)
+        changed, page.robots.own = state.own != page.robots.own, state.own
+        robot = page.robots.get(state.robot)
+        if robot != page.arm.robot:
+            page.robots.show(robot, state.q)
             if state.camera is not None:
                 page.camera.restore(state.camera)
         elif changed:
-            page.panel.robots.show(robot, page.own)
+            page.panel.robots.show(robot, page.robots.own)
         self._restore_arm(state)
 
     def _restore_arm(self, state: PageState) -> None:
-        page, arm = self._page, self._page.arm
+        arm = self._page.arm
         task: Task = state.task or DEFAULT_TASK
-        locks = [i in state.locks for i in range(page.now.robot.n)]
-        page.sliders.show_locks(locks)
-        q = page.now.robot.q_home if state.q is None else state.q
+        locks = [i in state.locks for i in range(arm.robot.n)]
+        q = arm.robot.q_home if state.q is None else state.q
         arm.restore(q, state.target, task, state.branch, locks)
-        page.forms.show()
 
-    def _move_into_view(self, motion: Callable[[], None], title: str) -> None:
+    def _move_into_view(self, q: Array, title: str) -> None:
         """Move the arm, and the camera if it would not show the whole arm."""
-        self._move(motion, title)
-        self._page.keep_in_view()
+        self._move(q, title)
+        self._page.picture.keep_in_view()
 
-    def _move(self, motion: Callable[[], None], title: str) -> None:
-        motion()
-        self._page.status.show(replace(BY_HAND, title=title))
+    def _move(self, q: Array, title: str) -> None:
+        self._page.arm.move_to(q, replace(BY_HAND, title=title))
 
     def _on_slider(self, robot_id: str, index: int, units: Units, place: int, value: object) -> None:
         page = self._page
         # An event of sliders that have been replaced since is ignored.
-        if (robot_id, units) == (page.now.robot.id, page.units):
-            page.arm.move_joint(index, page.sliders.read(index, value, place))
-            page.status.show(BY_HAND)
+        if (robot_id, units) == (page.arm.robot.id, page.display.units):
+            page.arm.move_joint(index, page.joints.sliders.read(index, value, place))
 
     def _on_redundancy(self, robot_id: str, name: str, units: Units, value: object) -> None:
         """Move through the self-motion while the tool is held."""
         page = self._page
-        if (robot_id, units) != (page.now.robot.id, page.units):
+        if (robot_id, units) != (page.arm.robot.id, page.display.units):
             return
         self._typed.slide(name, value, held=True)
 
     def _on_lock(self, robot_id: str, joint: int | None, lock: object) -> None:
-        if robot_id == self._page.now.robot.id:
-            self._page.change_lock(joint, bool(lock))
+        if robot_id == self._page.arm.robot.id:
+            self._page.arm.change_lock(joint, bool(lock))
 
     def _on_branch_choice(self, robot_id: str, value: object) -> None:
         """Move to the same pose on another branch, and stay on that branch."""
         page = self._page
-        if robot_id == page.now.robot.id:
+        if robot_id == page.arm.robot.id:
             branch = page.posture.read(value)
             if not page.arm.switch_branch(branch) and branch is not None:
                 page.status.show(page.posture.not_here(branch))
@@ -105,15 +101,15 @@ class ArmControls:
 
     def _on_robot_choice(self, value: object) -> None:
         page = self._page
-        if (robot := page.panel.robots.read(value)) == page.now.robot:
+        if (robot := page.panel.robots.read(value)) == page.arm.robot:
             return
         # The visitor's own arm has another id after every change; only the present one can be shown again.
-        own = None if page.own is None else page.own.robot.id
-        ids = {own, *(offered.id for offered in page.store.robots)}
+        own = None if page.robots.own is None else page.robots.own.robot.id
+        ids = {own, *(offered.id for offered in page.services.store.robots)}
         self._left = {name: state for name, state in self._left.items() if name in ids}
-        self._left[page.now.robot.id] = page.snapshot()
+        self._left[page.arm.robot.id] = page.snapshot()
         left = self._left.get(robot.id)
-        page.change_robot(robot, None if left is None else left.q)
+        page.robots.show(robot, None if left is None else left.q)
         if left is None:
             page.lessons.begin(keep_arm=True)  # the open step is about a pose of this arm
         page.status.show(introduction(robot))

@@ -10,7 +10,7 @@ from dataclasses import replace
 import kin
 from app.viewer.panel.jog import STEPS
 from app.viewer.panel.script import Reply
-from app.viewer.panel.status import Notice
+from app.viewer.panel.status import BY_HAND, Notice
 from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
 from app.viewer.session.looks import Looks
 from app.viewer.session.parts import Page
@@ -21,7 +21,6 @@ from kin.units import NAMES
 
 _NO_FURTHER = Notice("unreachable", "No further in this direction", "The tool does not follow the target there.")
 _AT_LIMIT = Notice("limits", "The joint is at its limit", "It goes no further in this direction.")
-BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
 
 LONGEST_LABEL = 40  # characters
@@ -52,7 +51,7 @@ class TypedInput:
         page = self._page
         match value:
             case [uuid, str(text)]:
-                joint, name = page.sliders.index_of(uuid), page.posture.name_of(uuid)
+                joint, name = page.joints.sliders.index_of(uuid), page.posture.name_of(uuid)
             case _:
                 raise kin.InputError("field", value, "an id and a text")
         if joint is not None:
@@ -61,8 +60,7 @@ class TypedInput:
             self._answer(number, lambda: self.slide(name, page.posture.read_text(name, text), held=False))
 
     def _set_joint(self, joint: int, uuid: object, text: str) -> None:
-        self._page.arm.move_joint(joint, self._page.sliders.read_text(uuid, text), held=False)
-        self._page.status.show(BY_HAND)
+        self._page.arm.move_joint(joint, self._page.joints.sliders.read_text(uuid, text), held=False)
 
     def set_target(self, number: int, value: object) -> None:
         """A typed target, or what the pendant shows of the joints."""
@@ -78,25 +76,24 @@ class TypedInput:
 
     def _set_pendant(self, text: str) -> None:
         """Joint values as the arm's pendant shows them."""
-        self._page.arm.move_to(self._page.sliders.read_pendant(text))
-        self._page.status.show(BY_HAND)
+        self._page.arm.move_to(self._page.joints.sliders.read_pendant(text))
 
     def _set_target(self, kind: PoseKind, text: str, relative: bool) -> None:
         """Typed numbers are in the frame of the read-out, or `relative` to the tool."""
         page, arm = self._page, self._page.arm
-        tool = kin.fk(page.now.robot, arm.goal)
-        frame = page.frames.pose(page.now.robot, arm.goal, relative)
+        tool = kin.fk(page.arm.robot, arm.goal)
+        frame = page.display.frames.pose(page.arm.robot, arm.goal, relative)
         present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
-        maker = page.now.robot.maker
-        T, given = read_pose(kind, text, page.units, present, page.view.rotations, maker)
+        maker = page.arm.robot.maker
+        T, given = read_pose(kind, text, page.display.units, present, page.display.view.rotations, maker)
         T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
-        if given != "pose" and page.now.task != given:
-            page.set_task(given)
-        elif given == "pose" and kind != "position" and page.now.task == "position":
-            page.set_task("pose")
+        if given != "pose" and page.arm.task != given:
+            page.arm.set_task(given)
+        elif given == "pose" and kind != "position" and page.arm.task == "position":
+            page.arm.set_task("pose")
         arm.set_target(T)
-        page.keep_in_view(T[:3, 3])
+        page.picture.keep_in_view(T[:3, 3])
 
     def _answer(self, number: int, action: Callable[[], None]) -> None:
         """Act on a typed text, and tell the page whether it was valid."""
@@ -120,7 +117,7 @@ class TypedInput:
 
     def jog(self, value: object) -> None:
         """Move the tool, or one joint, by one step of so many millimetres or degrees."""
-        arm, robot = self._page.arm, self._page.now.robot
+        arm, robot = self._page.arm, self._page.arm.robot
         match value:
             case [("tool" | "base") as frame, (0 | 1 | 2 | 3 | 4 | 5) as axis, (-1 | 1) as sign, int(step)]:
                 self._check_step(step)
@@ -132,8 +129,8 @@ class TypedInput:
                 moved = arm.goal.copy()
                 moved[joint] += sign * _amount(step, bool(robot.revolute[joint]))
                 within = robot.clip(moved)[joint]
-                arm.move_joint(joint, float(within), held=False)
-                self._page.status.show(BY_HAND if within == moved[joint] else _AT_LIMIT)
+                notice = BY_HAND if within == moved[joint] else _AT_LIMIT
+                arm.move_joint(joint, float(within), held=False, notice=notice)
             case _:
                 raise kin.InputError("jog", value, "tool, base or joints, an axis or a joint, a sign and a step")
 
@@ -144,7 +141,7 @@ class TypedInput:
     def switch_axes(self, _: object) -> None:
         """Align the gizmo with the base if it is aligned with the tool, and the reverse."""
         page = self._page
-        self._looks.use_view(replace(page.view, base_axes=not page.view.base_axes))
+        self._looks.use_view(replace(page.display.view, base_axes=not page.display.view.base_axes))
 
     def snap(self, value: object) -> None:
         """Drag the gizmo in steps, or freely."""
@@ -154,6 +151,6 @@ class TypedInput:
         """Set a redundancy parameter, in screen units, while the tool stays; `held`: with its slider."""
         page = self._page
         q, result = page.posture.move(name, value, held)
-        page.status.show_result(result, page.units)
+        page.status.show_result(result, page.display.units)
         if q is not None:
             page.arm.slide_along(q)

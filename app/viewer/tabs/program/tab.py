@@ -87,7 +87,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         return {"planned": self._planned}
 
     def panel(self) -> Sequence[Node]:
-        f, s, units = self.read, self.settings, self.stage.units
+        f, s, units = self.read, self.settings, self.stage.display.units
         opened, drawn = (f.chosen, f.point), (s.path, s.ghosts, s.frames)
         form = [self.spec(name).cell(f"way-{name}", getattr(s, name), units) for name in ("seconds", "seed")]
         found = f.work("way") if s.search else None
@@ -100,7 +100,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
             Html(plot_html, (f.motion, s.joint, units, f.other)),
             Html(views.summary, (f.plan, s.own, units)),
             Html(views.comparison, (f.whole, f.other, s.compare, s.zone, units)),
-            Html(views.files, (f.motion, bool(f.segments), s.own, self.stage.service, s.language)),
+            Html(views.files, (f.motion, bool(f.segments), s.own, self.stage.links.service, s.language)),
         ]
 
     def scene(self) -> Sequence[Lazy]:
@@ -120,7 +120,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
             args = f.way, *s.limits, s.search
             found.append(Work("way", in_background(ways.search), args, poll=REPORT))
         if s.playing:
-            found.append(Sweep(self._play_on, self.stage.frame, math.inf))
+            found.append(Sweep(self._play_on, self.stage.services.pace.interval, math.inf))
         return found
 
     def worked(self, key: str) -> None:
@@ -137,8 +137,8 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         super().tick(now)
 
     def started(self) -> None:
-        own = self.stage.own
-        self.change(own=own is not None and own.robot == self.stage.now.robot)
+        own = self.stage.robots.own
+        self.change(own=own is not None and own.robot == self.stage.arm.now.robot)
 
     @property
     def failure(self) -> str:
@@ -156,9 +156,9 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         return {"programs": rows.packed(self.settings.programs or {}), **changed}
 
     def restore(self, state: dict[str, object]) -> None:
-        robots = {robot.id: robot for robot in self.stage.store.robots}
-        if self.stage.own is not None:
-            robots[KEY] = self.stage.own.robot
+        robots = {robot.id: robot for robot in self.stage.services.store.robots}
+        if self.stage.robots.own is not None:
+            robots[KEY] = self.stage.robots.own.robot
         given = state.get("programs")
         items = given.items() if isinstance(given, dict) else ()
         read = {key: rows.unpack(value, robots[key]) for key, value in items if key in robots}
@@ -222,7 +222,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         return label or super().step_name(key)
 
     def _act(self, name: str, value: object) -> None:
-        f, s, here = self.facts, self.settings, self.stage.now.goal
+        f, s, here = self.facts, self.settings, self.stage.arm.now.goal
         match name:
             case "record":
                 self._insert(len(f.segments), Ptp(recorded(here)), chosen=None)
@@ -272,9 +272,9 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
                 self._go_to_row(index)
             case "set":
                 self._open(index)
-                self._set_target(index, self.stage.now.goal, min(self.settings.point, len(targets(row)) - 1))
+                self._set_target(index, self.stage.arm.now.goal, min(self.settings.point, len(targets(row)) - 1))
             case "via" if isinstance(row, Circ):
-                self._put(index, replace(row, via=rows.point(self.stage.now.T_goal[:3, 3])))
+                self._put(index, replace(row, via=rows.point(self.stage.arm.now.T_goal[:3, 3])))
             case "ptp":
                 self._set_kind(index, "ptp")
             case "take" if f.plan is not None and (arrival := f.plan.arrives_otherwise(index)) is not None:
@@ -301,12 +301,12 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
 
     def _asked(self, index: int) -> Asked | None:
         plan = self.facts.plan
-        return None if plan is None else Asked(index, plan, self.stage.now)
+        return None if plan is None else Asked(index, plan, self.stage.arm.now)
 
     def _refuse(self, title: str, detail: str) -> None:
         """Say why a change is not made; fields show what is true again."""
         self.change(revision=self.settings.revision + 1)
-        self.stage.notify(Notice("error", title, detail))
+        self.stage.status.show(Notice("error", title, detail))
 
     # The program
 
@@ -316,7 +316,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         Returns whether there was room for them.
         """
         f = self.facts
-        segments, count = rows.begun(segments, f.robot, self.stage.now.goal), rows.places(f.segments)
+        segments, count = rows.begun(segments, f.robot, self.stage.arm.now.goal), rows.places(f.segments)
         programs = {key: value for key, value in (self.settings.programs or {}).items() if key != f.key}
         if segments:
             programs[f.key] = replace(program or f.program or Program(segments), segments=segments)
@@ -338,10 +338,10 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         """Take a program from elsewhere, and say so; returns whether there was room for it."""
         self.schedule()
         self.invalidate()
-        program = rows.opened(program, self.facts.robot, self.stage.now.goal)
+        program = rows.opened(program, self.facts.robot, self.stage.arm.now.goal)
         taken = self._use(program.segments, None, program)
         if taken and self.facts.fault is None:
-            self.stage.notify(Notice("hand", title, rows.counted(program.segments)))
+            self.stage.status.show(Notice("hand", title, rows.counted(program.segments)))
         return taken
 
     def _open(self, index: int | None) -> None:
@@ -358,7 +358,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         where = "on the way back to the start" if index >= count else f"on the way to {index + 1} of {count}"
         if index == rows.start_of(f.segments):
             where = "at its start"
-        self.stage.notify(Notice("error", f"The program ends {where}", f.fault.words))
+        self.stage.status.show(Notice("error", f"The program ends {where}", f.fault.words))
 
     # Changes of the rows
 
@@ -396,7 +396,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
                 return
             case "add-point":
                 at += 1
-                points.insert(at, rows.as_point(row, recorded(self.stage.now.goal), self.facts.robot))
+                points.insert(at, rows.as_point(row, recorded(self.stage.arm.now.goal), self.facts.robot))
             case "delete-point" if len(points) > 1:
                 points.pop(at)
                 at = max(at - 1, 0)
@@ -443,15 +443,15 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         touch = None if f.plan is None or f.plan.touch is None else f.plan.touch.segment
         touched = touch if f.fault is None else f.fault.index
         if taken and (touched is None or not found.leads_by(touched)):
-            self.stage.notify(Notice("hand", *found.said()))
+            self.stage.status.show(Notice("hand", *found.said()))
 
     # Fields
 
     @property
     def _fields(self) -> Fields:
         """How values are written and read."""
-        arm, stage = self.stage.now, self.stage
-        return Fields(arm.robot, stage.units, stage.frames.pose(arm.robot, arm.goal), arm.task)
+        arm, stage = self.stage.arm.now, self.stage
+        return Fields(arm.robot, stage.display.units, stage.display.frames.pose(arm.robot, arm.goal), arm.task)
 
     def _type(self, index: int, value: object) -> None:
         f = self.facts
@@ -478,7 +478,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if not isinstance(text, str):
             raise InputError(name, text, "a text")
         try:
-            self.change(**{name: self.spec(name).typed(text, self.stage.units)})
+            self.change(**{name: self.spec(name).typed(text, self.stage.display.units)})
         except EntryError as error:
             self._refuse(error.title, error.detail)
 
@@ -488,17 +488,17 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         """Go on from a time; the arm first comes to where the motion is."""
         self.change(playing=True, leads=True)
         self._go(time, ease=True)
-        self.stage.play(True)
+        self.stage.arm.playing = True
 
     def _stop(self) -> None:
         """Leave the arm where it is."""
         if self.settings.playing:
             self.change(playing=False)
-            self.stage.play(False)
+            self.stage.arm.playing = False
 
     def _play_on(self, seconds: float) -> None:
         """Show the next frame."""
-        f, s, now = self.facts, self.settings, self.stage.now
+        f, s, now = self.facts, self.settings, self.stage.arm.now
         if not f.playable or s.sent is None or not np.array_equal(s.sent, now.goal):
             self._stop()  # the visitor has moved the arm, or changed the program
         elif s.leads:
@@ -507,7 +507,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
             self._go(time)
         else:
             assert f.plan is not None
-            self._go(f.duration, views.ended(f.plan, s.rate, self.stage.units))
+            self._go(f.duration, views.ended(f.plan, s.rate, self.stage.display.units))
             self._stop()
 
     def _go(self, time: float, notice: Notice | None = None, ease: bool = False) -> None:
@@ -517,7 +517,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         assert f.plan is not None
         q = f.robot.clip(f.motion.derivatives(time)[0])
         self.change(time=time, sent=q)
-        self.stage.move_to(q, notice or views.playing(f.plan, f.plan.row_at(time)), at_once=not ease)
+        self.stage.arm.move_to(q, notice or views.playing(f.plan, f.plan.row_at(time)), at_once=not ease)
 
     def _scrub(self, time: object) -> None:
         if not isinstance(time, int | float) or isinstance(time, bool) or not 0.0 <= time < 1e9:
@@ -537,7 +537,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         if time is not None:
             self._stop()
             self.change(time=time)
-        self.stage.move_to(f.robot.clip(q), Notice("hand", views.title(index, f.segments[index])))
+        self.stage.arm.move_to(f.robot.clip(q), Notice("hand", views.title(index, f.segments[index])))
 
     def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
         yield from ((ACTS[name], (name,), None) for name in ("record", "pause", "clear"))

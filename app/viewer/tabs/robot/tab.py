@@ -101,7 +101,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         return self._comparing.place
 
     def panel(self) -> Sequence[Node]:
-        s, robot, units, stage = self.settings, self.read.robot, self.stage.units, self.stage
+        s, robot, units, stage = self.settings, self.read.robot, self.stage.display.units, self.stage
         tables = [
             Html(views.table, (robot, units, s.rows, s.written, s.texts)),
             Html(views.motion, (robot, units, s.texts)),
@@ -109,7 +109,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         ]
         if self.hides("table"):
             tables = [Html(views.withheld), Html(str), Html(str)]
-        start = robot, self._beginnings.origin, self._own is not None, stage.store.robots, s.texts
+        start = robot, self._beginnings.origin, self._own is not None, stage.services.store.robots, s.texts
         meshes, uploads = "" if self._own is None else stage.bodies.file_of(self._own), self._uploads
         heavy = bool(meshes) or stage.bodies.detailed
         return [
@@ -119,7 +119,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
             Html(views.about, (robot, units)),
             tables[1],
             Html(views.wrong, ("wrong-motion", s.texts)),
-            Html(views.frames, (robot, units, stage.frames, s.texts)),
+            Html(views.frames, (robot, units, stage.display.frames, s.texts)),
             Html(views.wrong, ("wrong-frames", s.texts)),
             tables[2],
             Native(self._place),
@@ -134,7 +134,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         super().restore({"texts": {}, "compare": {}, **state})
 
     def on_style(self) -> None:
-        before, other = self.settings, self.read.units != self.stage.units
+        before, other = self.settings, self.read.units != self.stage.display.units
         texts = before.texts.valid(lambda cell: other or workpieces.workpiece_of(cell[0]) is not None)
         self.change(texts=texts, rows=before.rows + other)
         self._say_lost(_lost(before.texts, texts))
@@ -197,11 +197,11 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
                 self._use_mended(value)
             case "cancel":
                 if words := self._uploads.stop():
-                    self.stage.notify(Notice("hand", "Cancelled", words))
+                    self.stage.status.show(Notice("hand", "Cancelled", words))
             case "frame-add":
-                self.stage.use_frames(workpieces.added(self.stage))
+                self.stage.display.use_frames(workpieces.added(self.stage))
             case "frame-remove":
-                self.stage.use_frames(workpieces.removed(self.stage.frames, value))
+                self.stage.display.use_frames(workpieces.removed(self.stage.display.frames, value))
             case "other":
                 self._comparing.choose(value)
             case "agree":
@@ -242,9 +242,9 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         mine, before, replaced = self._own is not None, self.settings, None
         lost = _lost(before.texts, texts, *typed)
         self.change(texts=texts)
-        if not edits.alike(own.robot, self.stage.now.robot, mine or ("arm", "name") in typed):
-            replaced = None if mine else self.stage.own
-            self.stage.edit_arm(own)  # which calls `on_robot`
+        if not edits.alike(own.robot, self.stage.arm.now.robot, mine or ("arm", "name") in typed):
+            replaced = None if mine else self.stage.robots.own
+            self.stage.robots.edit(own)  # which calls `on_robot`
             self.change(texts=texts, rows=before.rows if typed else self.settings.rows)
             self.schedule()
         if replaced is not None:
@@ -254,7 +254,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
 
     def _say_lost(self, lost: str) -> None:
         if lost:
-            self.stage.notify(Notice("advice", "A field that was not valid is as before", lost))
+            self.stage.status.show(Notice("advice", "A field that was not valid is as before", lost))
 
     def _type(self, where: int | str, column: str, value: object) -> None:
         """A cell was typed into. Cells that were wrong before may be valid together with it."""
@@ -270,7 +270,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         if framed:
             self._type_workpiece(cell, text)
             return
-        texts, robot, units = self.settings.texts, self.stage.now.robot, self.stage.units
+        texts, robot, units = self.settings.texts, self.stage.arm.now.robot, self.stage.display.units
         kept = texts.valid(lambda other: column == "kind" and other[0] == where)  # the row has other fields then
         others = {key: wrong for key, (wrong, _) in kept.wrong.items() if workpieces.workpiece_of(key[0]) is None}
         for typed in ({**others, cell: text}, {cell: text}):
@@ -287,7 +287,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         """A cell of the page; raises `InputError` if there is none."""
         columns = {"arm": ("name", *edits.PLACE)}
         valid = edits.COLUMNS if isinstance(where, int) else columns.get(where, edits.AXES)
-        rows = range(len(self.stage.now.robot.rows))
+        rows = range(len(self.stage.arm.now.robot.rows))
         if where not in (rows if isinstance(where, int) else ("arm", *edits.FRAMES)) or column not in valid:
             raise InputError("cell", (where, column), "a cell of the table")
         return where, column
@@ -295,17 +295,17 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
     def _type_workpiece(self, cell: Cell, text: str) -> None:
         texts = self.settings.texts
         try:
-            frames = workpieces.typed(self.stage.frames, cell, text, self.stage.units)
+            frames = workpieces.typed(self.stage.display.frames, cell, text, self.stage.display.units)
         except EditError as error:
             self.change(texts=texts.refused(cell, text, error.message))
         else:
             self.change(texts=texts.valid())  # `on_style`, called next, would say they are lost
-            self.stage.use_frames(frames)
+            self.stage.display.use_frames(frames)
             self.change(texts=texts.taken({cell: text}))
             self.schedule()
 
     def _change_rows(self, action: str, index: int) -> None:
-        robot, own = self.stage.now.robot, self._own
+        robot, own = self.stage.arm.now.robot, self._own
         count = len(robot.rows)
         if not 0 <= index < count:
             raise InputError("row", index, f"0 to {count - 1}")
@@ -321,7 +321,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
     def _reread(self, convention: object) -> None:
         if convention not in kin.robot.CONVENTIONS:
             raise InputError("convention", convention, "one of " + ", ".join(kin.robot.CONVENTIONS))
-        self._try(lambda: edits.reread(self.stage.now.robot, self._own, str(convention)))
+        self._try(lambda: edits.reread(self.stage.arm.now.robot, self._own, str(convention)))
 
     def _convert(self, action: object) -> None:
         """Show the arm in the other convention, take that table, or close it."""
@@ -329,7 +329,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
             raise InputError("convert", action, "show, use or close")
         self.change(converting=action == "show")
         if action == "use":
-            self._try(lambda: edits.converted(self.stage.now.robot, self._own))
+            self._try(lambda: edits.converted(self.stage.arm.now.robot, self._own))
 
     def _try(self, change: Callable[[], OwnArm], texts: Texts | None = None) -> None:
         """Change the arm; `texts`: what its fields show then, if not those that are valid now."""
@@ -343,7 +343,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
     def _refuse(self, title: str, detail: str) -> None:
         """Say why something is not done, and write the fields anew."""
         self._write_fields(self.settings.texts)
-        self.stage.notify(Notice("error", title, detail))
+        self.stage.status.show(Notice("error", title, detail))
 
     def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
         return [(f"Save the arm as {about}", ("download",), kind) for kind, (about, *_) in KINDS.items()]
@@ -353,9 +353,9 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
     def _download(self, kind: object) -> None:
         if self.hides("table"):
             words = "The file would contain the table that the open exercise asks for."
-            self.stage.notify(Notice("advice", "Not now", words))
+            self.stage.status.show(Notice("advice", "Not now", words))
             return
-        robot = self.stage.now.robot if self._own is None else named(self.stage.now.robot)
+        robot = self.stage.arm.now.robot if self._own is None else named(self.stage.arm.now.robot)
         name, text = text_of(robot, kind)
         save_file(self.stage, name, text)
 
@@ -363,7 +363,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
         if isinstance(value, IncomingFile):
             self._open(lambda: self._uploads.take(value))
         else:
-            self.stage.notify(Notice("error", *not_sent(value)))
+            self.stage.status.show(Notice("error", *not_sent(value)))
 
     def _open(self, act: Callable[[], None]) -> None:
         """Take a file, or a choice about it, a step further."""
@@ -387,7 +387,7 @@ class RobotTab(DeclaredFeature[RobotTabSettings, Facts[RobotTabSettings]]):
     def _take_other(self, value: object) -> None:
         """A text with the arm to compare with."""
         if not isinstance(value, IncomingFile):
-            self.stage.notify(Notice("error", *not_sent(value)))
+            self.stage.status.show(Notice("error", *not_sent(value)))
             return
         try:
             self._comparing.take(value)

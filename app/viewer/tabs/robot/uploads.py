@@ -83,7 +83,7 @@ class Uploads:
         self._stage = stage
         self._post = post
         self._begin = begin
-        self._awaited = Awaited(lambda *words: stage.notify(Notice("error", *words)))
+        self._awaited = Awaited(lambda *words: stage.status.show(Notice("error", *words)))
         self._number = 0
         self._tip: str | None = None  # of the URDF that was opened last
         self._reading: _Reading | None = None
@@ -163,7 +163,7 @@ class Uploads:
             self.waiting = source
             what = ("ends", "the link of the tool") if source.text else ("robots", "one of its URDF files")
             title = f"{source.name} has several {what[0]}"
-            self._stage.notify(Notice("advice", title, f"Choose {what[1]}, below."))
+            self._stage.status.show(Notice("advice", title, f"Choose {what[1]}, below."))
             return
         name = f"{source.name}: {source.urdf}" if source.urdf else source.name
         self._tip = tip
@@ -210,7 +210,7 @@ class Uploads:
         except MeshError as error:
             raise file_error(source.name, error) from None
         fingers, kept = fingers_of(robot, visuals), links if shapes.bodies else ()
-        self._reading = _Reading(own, self._stage.now.robot.id, source, count, kept, fingers)
+        self._reading = _Reading(own, self._stage.arm.now.robot.id, source, count, kept, fingers)
         future.add_done_callback(partial(self._post, done))
         self._future = future
         return f"Its {count} meshes are being read." if count else "Its collision meshes are being read."
@@ -241,8 +241,10 @@ class Uploads:
         if meshes.triangles > MOST_TRIANGLES:
             words += f", simplified to about {MOST_TRIANGLES}"
         bodies = self._use_capsules(reading, meshes)
-        self._stage.redraw_body()
-        self._stage.notify(Notice("hand", f"The meshes of {source.name} are shown", f"{words}. {HERE} {bodies}"))
+        self._stage.post("body", "")
+        self._stage.status.show(
+            Notice("hand", f"The meshes of {source.name} are shown", f"{words}. {HERE} {bodies}")
+        )
 
     def _use_capsules(self, reading: _Reading, meshes: Meshes) -> str:
         """Give the arm the capsules of its collision bodies, and say where they are from."""
@@ -252,8 +254,8 @@ class Uploads:
         own, words = with_capsules(reading.own, reading.links, meshes.fits)
         if self.last == reading.own:
             self.last = own
-        if self._stage.own == reading.own and self._stage.now.robot == reading.robot:
-            self._stage.edit_arm(own)
+        if self._stage.robots.own == reading.own and self._stage.arm.now.robot == reading.robot:
+            self._stage.robots.edit(own)
         return words
 
     def refuse(self, value: object) -> str:
@@ -267,7 +269,7 @@ class Uploads:
                 pass
             case _:
                 raise InputError("refused", value, "the file that is refused")
-        robot = self._stage.now.robot
+        robot = self._stage.arm.now.robot
         if robot != reading.robot or robot.id == reading.replaced or not left:
             return words
         self._stage.post("undo")  # once more for each step that the visitor has made since
@@ -295,4 +297,4 @@ class Uploads:
 
     def _say_wrong(self, source: Source, words: str) -> None:
         detail = f"The arm is a skeleton. {words}"
-        self._stage.notify(Notice("error", f"The meshes of {source.name} cannot be shown", detail))
+        self._stage.status.show(Notice("error", f"The meshes of {source.name} cannot be shown", detail))

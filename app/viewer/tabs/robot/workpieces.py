@@ -44,9 +44,9 @@ def typed(frames: Frames, cell: Cell, text: str, units: Units) -> Frames:
 
 def added(stage: Stage) -> Frames:
     """One more frame, upright at the tool point."""
-    if len(stage.frames.workpieces) >= MOST:
+    if len(stage.display.frames.workpieces) >= MOST:
         raise InputError("workpieces", f"{MOST + 1} frames", f"at most {MOST} in a page")
-    return stage.frames.add(stage.now.T_goal[:3, 3])
+    return stage.display.frames.add(stage.arm.now.T_goal[:3, 3])
 
 
 def removed(frames: Frames, index: object) -> Frames:

@@ -109,7 +109,7 @@ class CloudView:
     @property
     def other(self) -> Robot | None:
         """The robot to compare with."""
-        return None if self.settings.compare is None else self._stage.store.get(self.settings.compare)
+        return None if self.settings.compare is None else self._stage.services.store.get(self.settings.compare)
 
     @property
     def busy(self) -> bool:
@@ -130,11 +130,11 @@ class CloudView:
     def _requested(self) -> Cloud:
         """The cloud that settings and locks describe."""
         return Cloud(
-            self._stage.now.robot,
+            self._stage.arm.now.robot,
             self.settings.n,
             self.settings.seed,
             self.settings.strategy,
-            constraints=self._stage.now.options.constraints,
+            constraints=self._stage.arm.now.options.constraints,
         )
 
     def _is_shown(self, cloud: Cloud) -> bool:
@@ -144,7 +144,7 @@ class CloudView:
     def _add(self, cloud: Cloud, which: int) -> CloudNodes:
         nodes = CloudNodes(
             self._stage.client.scene,
-            self._stage.clouds,
+            self._stage.services.clouds,
             cloud,
             self._look(which),
             self.settings.size,
@@ -225,8 +225,8 @@ class CloudView:
                 state = "recolouring"
         speed = drawn / elapsed if elapsed > 0.0 else 0.0
         cloud = self.nodes[0].cloud if self.nodes else None
-        constraints = self._stage.now.options.constraints if cloud is None else cloud.constraints
-        locked = constraints.locks(self._stage.now.robot if cloud is None else cloud.robot)
+        constraints = self._stage.arm.now.options.constraints if cloud is None else cloud.constraints
+        locked = constraints.locks(self._stage.arm.now.robot if cloud is None else cloud.robot)
         old = bool(self.nodes) and not self._is_shown(self._requested)
         line = views.progress(state, drawn, total or self.settings.n, speed, locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
@@ -278,14 +278,14 @@ class CloudView:
         if self._grey or not any(nodes.parts for nodes in self.nodes):
             self._said.legend = ""
             return
-        robot, other = self._stage.now.robot, self.other
+        robot, other = self._stage.arm.now.robot, self.other
         if other is not None:
             content = colours.names_legend([(colours.OWN, robot.name), (colours.OTHER, other.name)])
         elif self.settings.by == "one":
             content = colours.names_legend([(colours.OWN, robot.name)])
         else:
             scale = colours.scale_of(robot, self.settings.by)
-            content = colours.legend(scale, self.settings.map, self._stage.units)
+            content = colours.legend(scale, self.settings.map, self._stage.display.units)
         self._said.legend = content
 
     def _look(self, which: int) -> Look:

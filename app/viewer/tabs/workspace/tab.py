@@ -89,10 +89,10 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         self._clouds.report()
 
     def panel(self) -> Sequence[Node]:
-        s, robot, unit = self.settings, self.stage.now.robot, self.stage.units.lengths
+        s, robot, unit = self.settings, self.stage.arm.now.robot, self.stage.display.units.lengths
         presets = {label: self.event(self.on_preset, number) for label, number in PRESETS.items()}
         nodes: list[Node] = [Control("n"), Buttons(" ", presets, "Common numbers of points", key="presets")]
-        if is_in_the_book(robot, self.stage.store.robots):
+        if is_in_the_book(robot, self.stage.services.store.robots):
             figures = {label: self.event(self.on_figure, key) for label, key in FIGURES.items()}
             nodes.append(Buttons("As in the book", figures, figures_hint(robot), key="figures"))
         actions = {
@@ -103,11 +103,11 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
             "Stop": self.event(self.on_stop),
             "Clear": self.event(self.on_clear),
         }
-        others = tuple(other for other in self.stage.store.robots if other != robot)
+        others = tuple(other for other in self.stage.services.store.robots if other != robot)
         nodes += cloud(s, self._said, actions)
         nodes += form(s, self._said, robot, others, unit, self._picked(), self._sizes())
         if s.section:
-            f, units = self.read, self.stage.units
+            f, units = self.read, self.stage.display.units
             nodes.append(section.panel(f.work("section"), f.frame, f.image, f.T[:3, 3], robot, units))
         return nodes
 
@@ -116,7 +116,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         found = self.read.work("pick")
         if self.settings.click is None or not found.finished:
             return Html(str, key="picked")
-        return Html(views.picked, (found.value, self.stage.units), key="picked")
+        return Html(views.picked, (found.value, self.stage.display.units), key="picked")
 
     def scene(self) -> Sequence[SceneNode]:
         facts = self.facts
@@ -128,7 +128,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         if not self.settings.sizes:
             return Html(str, key="sizes")
         whole = self.read.work("sizes").value
-        args = whole or self.read.work("extent").value, whole is None, self.stage.units
+        args = whole or self.read.work("extent").value, whole is None, self.stage.display.units
         return Html(sizes.html, args, key="sizes")
 
     # Long work
@@ -137,18 +137,18 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         robot, stage, works = self.facts.robot, self.stage, list[Work]()
         if self.settings.sizes:  # volume and surface take longer than the rest
             works += [
-                Work("extent", lambda arm: stage.summaries.facts(arm, effort=None), (robot,)),
-                Work("sizes", stage.summaries.facts, (robot,)),
+                Work("extent", lambda arm: stage.services.summaries.facts(arm, effort=None), (robot,)),
+                Work("sizes", stage.services.summaries.facts, (robot,)),
             ]
         if self.settings.click is not None:
-            works.append(Work("pick", in_background(search), (stage.clouds, self.settings.click)))
+            works.append(Work("pick", in_background(search), (stage.services.clouds, self.settings.click)))
         return [*works, *self._sections()] if self.settings.section else works
 
     def _sections(self) -> Iterator[Work]:
         """The section and its outline, and the cloud in its plot."""
         facts, stage, subscribe = self.facts, self.stage, section.subscribe_section
-        yield Work("section", subscribe, (stage.summaries, facts.robot))
-        yield Work("outline", subscribe, (stage.summaries, facts.robot, True))
+        yield Work("section", subscribe, (stage.services.summaries, facts.robot))
+        yield Work("outline", subscribe, (stage.services.summaries, facts.robot, True))
         found = facts.work("section").value
         if found is None or not found.curves:
             return
@@ -156,7 +156,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         for nodes in self._clouds.nodes[:1] if facts.frame is not None else ():
             yield Work("density", lambda frame, _: Density(frame), (facts.frame, nodes.cloud))
             if (density := facts.work("density").value) is not None:
-                counted = stage.clouds, nodes.cloud, nodes.parts, density
+                counted = stage.services.clouds, nodes.cloud, nodes.parts, density
                 redraw = REDRAW if self._clouds.busy else 0.0
                 yield Work("image", in_background(section.count), counted, pace=redraw, keep=True)
 
@@ -179,7 +179,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         self._runner.end()
         self._clear()
         self.for_parts(lambda part: part.on_robot())
-        robot = self.stage.now.robot
+        robot = self.stage.arm.now.robot
         self._use(self.settings.for_robot(robot))
         self._set_cut()
         self._show_axes()
@@ -218,9 +218,9 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         return {**super().state(), "drawn": drawn}
 
     def restore(self, state: dict[str, object]) -> None:
-        before, robot = self.settings, self.stage.now.robot
+        before, robot = self.settings, self.stage.arm.now.robot
         self._use(replace(before.restored(state, robot), opened=False))
-        if self.settings.compare not in (None, *(r.id for r in self.stage.store.robots if r != robot)):
+        if self.settings.compare not in (None, *(r.id for r in self.stage.services.store.robots if r != robot)):
             self._use(replace(self.settings, compare=before.compare))  # the robot is gone
         at = self.settings.at
         self._clouds.report()
@@ -281,9 +281,9 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
 
     def on_figure(self, robot_id: str) -> None:
         """A workspace as the source chapter shows it."""
-        robot = self.stage.store.get(robot_id)
-        if robot != self.stage.now.robot:
-            self.stage.change_robot(robot)  # which calls `on_robot`
+        robot = self.stage.services.store.get(robot_id)
+        if robot != self.stage.arm.now.robot:
+            self.stage.robots.show(robot)  # which calls `on_robot`
         self._set(**FIGURE)
         self._start()
 
@@ -294,7 +294,11 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
             self.changed(name)
 
     def _show_axes(self) -> None:
-        self._axes.show(self.stage.now.robot if self.settings.axes else None, self.stage.units, self.stage.dark)
+        self._axes.show(
+            self.stage.arm.now.robot if self.settings.axes else None,
+            self.stage.display.units,
+            self.stage.display.dark,
+        )
 
     # Cloud and clicks
 
@@ -341,16 +345,16 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         found = self.facts.work("pick").value
         if found is not None:
             title = f"Moved to point {grouped(found.index)}"
-            self.stage.move_to(found.q, Notice("hand", title, "The configuration that produced this point."))
+            self.stage.arm.move_to(found.q, Notice("hand", title, "The configuration that produced this point."))
 
     def _fit_view(self) -> None:
         """Fit the default view to clouds, map and axes when they appear, and to the arm when they are gone."""
         clouds, mapped = self._clouds.extents, self._capability.extent
         corners = self._axes.corners
-        in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.now.robot)
+        in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.arm.now.robot)
         if in_view != self.settings.in_view:
             self._use(replace(self.settings, in_view=in_view))
-            self.stage.fit_view(clouds if mapped is None else [*clouds, mapped], corners)
+            self.stage.camera.fit(clouds if mapped is None else [*clouds, mapped], corners)
 
     def extents(self) -> Sequence[Sphere]:
         mapped, corners = self._capability.extent, self._axes.corners
@@ -369,7 +373,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         self._use(replace(self.settings, axis=axis, opened=axis is not None))
         self._set_cut()
         if (cut := self.settings.cut) is not None:
-            seen = float(np.array(cut.normal) @ self.stage.toward_camera())
+            seen = float(np.array(cut.normal) @ self.stage.camera.toward)
             self._use(replace(self.settings, keep="below" if seen >= 0.0 else "above"))
             self._show_slabs()
 
@@ -377,8 +381,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         """Cut along the axis in the settings, near the middle, or not at all."""
         cut = None
         if self.settings.axis is not None:
-            robots = [self.stage.now.robot, *([self._clouds.other] if self._clouds.other is not None else [])]
-            cut = cut_of(robots, self.settings.axis, self.stage.now.q)
+            robots = [self.stage.arm.now.robot, *([self._clouds.other] if self._clouds.other is not None else [])]
+            cut = cut_of(robots, self.settings.axis, self.stage.arm.now.q)
             self._use(replace(self.settings, at=cut.middle))
         self._use(replace(self.settings, cut=cut))
         self._clouds.set_cut(cut, None)

@@ -163,8 +163,8 @@ class Toy(DeclaredFeature[Knobs, Sums]):
         return [
             *more,
             Control("frame"),
-            Folder("Amounts", [Control("step"), Control("count", of=self.stage.now.robot.id)]),
-            Html(self.render, (round(self.read.total, 6), self.stage.units)),
+            Folder("Amounts", [Control("step"), Control("count", of=self.stage.arm.now.robot.id)]),
+            Html(self.render, (round(self.read.total, 6), self.stage.display.units)),
             Control("force.parts.1", label="Sideways, N", visible=s.force.on),
             Button("Add", self.event(self.on_add, 1), hold=10.0),
             Buttons("Go", {"a": self.event(self.on_go, "a"), "b": self.event(self.on_go, "b")}, offered=("a",)),

@@ -32,6 +32,7 @@ from app.shared.store import Store
 from app.viewer.feature import Feature
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
+from app.viewer.page.links import Links
 from app.viewer.panel import listen
 from app.viewer.panel.joints import UNLOCK_ALL, label, lock_buttons
 from app.viewer.server import ViewerServer
@@ -422,8 +423,9 @@ def test_a_link_opens_for_visitors_who_may_only_look_what_computes_nothing(lesso
     channel = SimpleNamespace(hello=lambda timeout: json.loads(text))
     for rights, shown in ((Rights.FULL, True), (Rights.LOOK, not lesson.computes)):
         activity = SimpleNamespace(review=SimpleNamespace(zone=""))
-        page_ = SimpleNamespace(channel=channel, store=STORE, activity=activity)
-        persistence = Persistence(page_, False, lambda action: action(), rights)  # type: ignore[arg-type]
+        services, links = SimpleNamespace(store=STORE), Links(False)
+        page_ = SimpleNamespace(channel=channel, services=services, activity=activity, rights=rights, links=links)
+        persistence = Persistence(page_, lambda action: action())  # type: ignore[arg-type]
         persistence.load()
         assert persistence.stored.lesson == (lesson.key if shown else None)
 

@@ -126,13 +126,13 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
 
     def started(self) -> None:
         run = self.settings.run
-        if run is not None and (same := run.of(self.stage.now.robot)) is not None:
+        if run is not None and (same := run.of(self.stage.arm.now.robot)) is not None:
             self.change(run=same)
         else:
             self.change(run=None, joints="")
 
     def running(self) -> Sequence[Work | Sweep]:
-        s, robot = self.settings, self.stage.now.robot
+        s, robot = self.settings, self.stage.arm.now.robot
         found: list[Work | Sweep] = []
         if s.wanted:
             what = s.what if s.run is None else s.run.what
@@ -146,18 +146,18 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
 
     def _plan(self, robot: Robot, what: Touched, count: int, run: Run | None) -> Subscription[Run]:
         made = None if run is None else (run.q.tobytes(), run.touches)
-        return self.stage.summaries.once(
+        return self.stage.services.summaries.once(
             (robot, what, count, made), lambda cancel: planned(robot, what, count, run, cancel)
         )
 
     def _fit(self, robot: Robot, what: Touched, touches: tuple[Touch, ...]) -> Subscription[Found]:
-        return self.stage.summaries.once(
+        return self.stage.services.summaries.once(
             (robot, what, touches), lambda cancel: solved(robot, what, touches, cancel)
         )
 
     def _look(self, seconds: float) -> None:
         """Look where the connected arm is."""
-        line, robot = self.stage.door.line, self.stage.now.robot
+        line, robot = self.stage.door.line, self.stage.arm.now.robot
         given = None if line is None else line.measured
         measured = None
         if given is not None and len(given) == robot.n:
@@ -170,7 +170,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         if isinstance(result.error, KinematicsError):
             if key == "plan":
                 self.change(wanted=0)
-                self.stage.notify(Notice("error", "No postures were found", str(result.error)))
+                self.stage.status.show(Notice("error", "No postures were found", str(result.error)))
         elif result.error is not None:
             super().worked(key)
         elif key == "plan" and result.finished:
@@ -178,7 +178,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
             if run is None:
                 self.change(wanted=0)
                 self._show(made)
-                self.stage.fit_view((), made.spots)
+                self.stage.camera.fit((), made.spots)
             else:  # something may be being typed for the posture on show
                 self.change(wanted=0, run=replace(made, at=run.at, course=run.course))
         elif key == "fit" and run is not None and self.facts.found is not None:
@@ -243,7 +243,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         return [*nodes, Buttons("Result", ends, hint, offered, key="result buttons")]
 
     def scene(self) -> Sequence[SceneNode]:
-        s, robot = self.settings, self.stage.now.robot
+        s, robot = self.settings, self.stage.arm.now.robot
         if (run := s.run) is None or self.hides("table"):
             return []
         q, asked, spots = run.q[run.at], run.sockets[run.at], run.spots
@@ -290,13 +290,17 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         # On a press alone: the field sends every letter, and 6 is on the way to 6.5. A press comes after all that
         # was typed before it, and what the field of another posture sends later is void (`PanelView`).
         run, stage = self._run, self.stage
-        self._show(run.with_read(read_joints(self.settings.joints, stage.now.robot, run.what, stage.units)))
+        self._show(
+            run.with_read(read_joints(self.settings.joints, stage.arm.now.robot, run.what, stage.display.units))
+        )
 
     def on_read(self) -> None:
         """Take where the connected arm is; raises `InputError`: no such arm can be there."""
         if (q := self.settings.measured) is not None:
             run, stage = self._run, self.stage
-            self._show(run.with_read(readable(q, stage.now.robot, run.what, stage.units, radians=True)))
+            self._show(
+                run.with_read(readable(q, stage.arm.now.robot, run.what, stage.display.units, radians=True))
+            )
 
     def on_forget(self) -> None:
         """Forget what was read in this posture."""
@@ -313,7 +317,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         """Say so if what was read in the posture on show is far from it: the next one takes its place."""
         read = run.read[run.at]
         if read is not None and (words := doubt(run.robot, run.q[run.at], read)):
-            self.stage.notify(Notice("advice", f"Posture {run.at + 1} is in doubt", words))
+            self.stage.status.show(Notice("advice", f"Posture {run.at + 1} is in doubt", words))
 
     def on_report(self) -> None:
         """Save what was found as one page."""
@@ -325,17 +329,17 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
         """Make the arm that was found that of the page; raises `KinematicsError`: it is too long for a link."""
         if (found := self.facts.ready) is None:
             return
-        nominal = self.stage.now.robot
+        nominal = self.stage.arm.now.robot
         made = own_arm(kin.robot_to_dict(as_own(found.calibration.robot)), nominal.id)
         self.on_stop()
-        self.stage.edit_arm(made)
+        self.stage.robots.edit(made)
         words = "The arm is your own. Save TOML keeps it in a file, and undo brings the nominal one back."
-        self.stage.notify(Notice("hand", f"{nominal.name} is calibrated", words))
+        self.stage.status.show(Notice("hand", f"{nominal.name} is calibrated", words))
 
     def on_stop(self) -> None:
         """End the run; undo brings it back."""
         self.change(run=None, joints="", wanted=0)
-        self.stage.fit_view(())
+        self.stage.camera.fit(())
 
     def _show(self, run: Run) -> None:
         """Show the posture of a run, and what was read in it."""
@@ -344,7 +348,7 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
 
     def _written(self, run: Run) -> str:
         """What was read in the posture on show, as it is typed."""
-        scales = [self.stage.units.of(bool(turns)).scale for turns in self.stage.now.robot.revolute]
+        scales = [self.stage.display.units.of(bool(turns)).scale for turns in self.stage.arm.now.robot.revolute]
         read = zip(run.read[run.at] or (), scales, strict=False)
         return " ".join(f"{value * scale:.8g}" for value, scale in read)
 
@@ -356,9 +360,9 @@ class Calibrate(DeclaredFeature[CalibrateSettings, CalibrateFacts]):
     # Links
 
     def state(self) -> dict[str, object]:
-        fresh = self.settings_of.fresh(self.stage.now.robot).state()
+        fresh = self.settings_of.fresh(self.stage.arm.now.robot).state()
         return {key: value for key, value in self.settings.state().items() if value != fresh[key]}
 
     def restore(self, state: dict[str, object]) -> None:
-        fresh = self.settings_of.fresh(self.stage.now.robot).state()
+        fresh = self.settings_of.fresh(self.stage.arm.now.robot).state()
         super().restore({**fresh, **state})

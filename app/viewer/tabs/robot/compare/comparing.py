@@ -90,9 +90,9 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         """Compare with an arm of the service, with a text, or with none."""
         found = None
         if value not in (TYPED, ""):
-            found = reference.restored(value, self.stage.store) if isinstance(value, str) else None
+            found = reference.restored(value, self.stage.services.store) if isinstance(value, str) else None
             if found is None:
-                valid = [TYPED, *(key for key, _ in reference.choices(self.stage.store))]
+                valid = [TYPED, *(key for key, _ in reference.choices(self.stage.services.store))]
                 raise InputError("other", value, "one of " + ", ".join(valid))
         self.change(typing=value == TYPED)
         self._use(found)
@@ -110,7 +110,7 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         if not isinstance(text, str):
             file.forget()
             raise InputError("text", file.name, "a robot file (TOML), a URDF or a table; no zip")
-        self._use(reference.of_text(file.name, text, self.stage.units, self.stage.now.robot.n))
+        self._use(reference.of_text(file.name, text, self.stage.display.units, self.stage.arm.now.robot.n))
 
     def _use(self, other: Reference | None) -> None:
         self.change(other=other, joint=1)
@@ -122,7 +122,7 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         """Compare the arm on show as it is now."""
         self._runner.end()
         if self.settings.overlay is not None:
-            self.stage.see_through(False)
+            self.stage.arm.scene.see_through(False)
             self._scene.remove()
         self.change(stopped=None, overlay=None)
         self.schedule()
@@ -146,13 +146,13 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         if s.other is None or s.stopped is not None or self.hides("table"):
             return ()
         arms = s.other.robot, self.facts.robot, s.frames
-        return [Work("comparison", self.stage.summaries.comparison, arms, poll=POLL)]
+        return [Work("comparison", self.stage.services.summaries.comparison, arms, poll=POLL)]
 
     def worked(self, key: str) -> None:
         f, s = self.facts, self.settings
         if isinstance(f.comparison.error, KinematicsError):
             words = str(f.comparison.error)
-            self.stage.notify(Notice("error", "These arms cannot be compared", words))
+            self.stage.status.show(Notice("error", "These arms cannot be compared", words))
             self.change(stopped=f.comparison)
         else:
             super().worked(key)
@@ -163,7 +163,7 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
             ends = min(f.robot.n, other.robot.n)
             self.change(joint=min(max(found.first.joints, default=ends), f.most - 1) + 1)
         self.change(overlay=Overlay(other.robot, f.robot, found))
-        self.stage.see_through(True, gizmo=True)
+        self.stage.arm.scene.see_through(True, gizmo=True)
 
     def proposed(self, index: object, own: OwnArm | None) -> OwnArm:
         """The arm on show with the changes of an explanation; raises `EditError`."""
@@ -171,12 +171,12 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         place = index_of(index, len(found))
         if place is None:
             raise EditError(None, "The table has changed since; this proposal is no longer for it.")
-        return edits.with_table(self.stage.now.robot, own, found[place].robot)
+        return edits.with_table(self.stage.arm.now.robot, own, found[place].robot)
 
     # What is shown
 
     def panel(self) -> Sequence[PanelNode]:
-        f, s, store = self.read, self.settings, self.stage.store
+        f, s, store = self.read, self.settings, self.stage.services.store
         if self.hides("table"):
             return ()
         other, drawn = s.other, s.overlay is not None
@@ -210,7 +210,7 @@ class Comparing(DeclaredFeature[CompareSettings, CompareFacts]):
         saved = state if isinstance(state, Mapping) else {}
         if saved == self.state():
             return
-        other = reference.restored(saved["with"], self.stage.store) if "with" in saved else None
+        other = reference.restored(saved["with"], self.stage.services.store) if "with" in saved else None
         frames = saved.get("frames")
         self.change(
             frames=cast(Frames, frames) if frames in get_args(Frames) else "fixed",

@@ -82,7 +82,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def started(self) -> None:
         run = self.settings.run
-        if run is not None and not run.of(self.stage.now.robot):
+        if run is not None and not run.of(self.stage.arm.now.robot):
             self.change(run=None)
 
     def running(self) -> Sequence[Sweep]:
@@ -157,7 +157,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         absent = {"Back": run.at == 0, "Find from two": not two, "Read program": not self.settings.streams}
         offered = tuple(name for name in acts if not absent.get(name))
         return [
-            Html(views.pose, (run, self.stage.units), key="pose"),
+            Html(views.pose, (run, self.stage.display.units), key="pose"),
             Control("readings", of=run.at),
             Buttons("Poses", acts, offered=offered, of=run.at, key="poses"),
         ]
@@ -177,10 +177,10 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         try:
             name, text = sent_text(value, LARGEST)
             self._use(
-                kin.motors.motors_from_lerobot(self.stage.now.robot, text), f"The calibration {name} is used"
+                kin.motors.motors_from_lerobot(self.stage.arm.now.robot, text), f"The calibration {name} is used"
             )
         except InputError as error:
-            self.stage.notify(Notice("error", "The file was not used", str(error)))
+            self.stage.status.show(Notice("error", "The file was not used", str(error)))
 
     def changed(self, path: str) -> None:
         self.invalidate()
@@ -189,16 +189,16 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             typed = self.settings.calibration
             self.change(calibration="")
             self.rewrite()
-            self._use(kin.motors.motors_from_lerobot(self.stage.now.robot, typed), "The calibration is used")
+            self._use(kin.motors.motors_from_lerobot(self.stage.arm.now.robot, typed), "The calibration is used")
         elif path in FIELDS and motor is not None:
             self.rewrite()  # a field whose text was refused shows what counts
             changed = replace(motor, **{path: getattr(self.settings, path)})
             if changed != motor:
-                self._use([changed if each.id == motor.id else each for each in self.stage.now.robot.motors])
+                self._use([changed if each.id == motor.id else each for each in self.stage.arm.now.robot.motors])
 
     def on_add(self) -> None:
         """A motor of each joint."""
-        joints = self.stage.now.robot.joints
+        joints = self.stage.arm.now.robot.joints
         leads = [LEAD if joint.kind == "prismatic" else None for joint in joints]
         self._use(
             [
@@ -213,8 +213,8 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def on_match(self) -> None:
         """Show the first pose."""
-        run = begun(self.stage.now.robot, self.stage.now.obstacles)
-        self.stage.fit_view((), run.points)
+        run = begun(self.stage.arm.now.robot, self.stage.arm.now.obstacles)
+        self.stage.camera.fit((), run.points)
         self._show_pose(run)
 
     def on_next(self) -> None:
@@ -248,11 +248,11 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
     def on_stop(self) -> None:
         """End the run."""
         self.change(run=None)
-        self.stage.fit_view(())
+        self.stage.camera.fit(())
 
     def on_save(self) -> None:
         """Save LeRobot's calibration."""
-        data = json.dumps(kin.motors.motors_to_lerobot(self.stage.now.robot), indent=4)
+        data = json.dumps(kin.motors.motors_to_lerobot(self.stage.arm.now.robot), indent=4)
         save_file(self.stage, "calibration.json", data, SAVED)
 
     def _show_pose(self, run: Run) -> None:
@@ -260,7 +260,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         self.change(run=run)
         self._write_readings(run.readings[run.at])
         words = "Put your arm as this one, then type what its motors read. Tab Robot."
-        self.stage.move_to(run.poses[run.at], Notice("hand", f"Pose {run.at + 1} of {COUNT}", words))
+        self.stage.arm.move_to(run.poses[run.at], Notice("hand", f"Pose {run.at + 1} of {COUNT}", words))
 
     def _write_readings(self, values: Sequence[float] | None) -> None:
         """Write readings into the field."""
@@ -269,11 +269,11 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def _use(self, motors: Sequence[Motor], done: str = "") -> None:
         """The arm with these motors becomes the visitor's own; raises `InputError`."""
-        robot, own = self.stage.now.robot, self.stage.own
+        robot, own = self.stage.arm.now.robot, self.stage.robots.own
         try:
             made = edits.with_motors(robot, own if own is not None and own.robot == robot else None, motors)
         except EditError as error:
             raise InputError("motors", "this", error.message) from None
-        self.stage.edit_arm(made)
+        self.stage.robots.edit(made)
         if done:
-            self.stage.notify(Notice("hand", done, "The arm is your own. Save TOML keeps it in a file."))
+            self.stage.status.show(Notice("hand", done, "The arm is your own. Save TOML keeps it in a file."))

@@ -95,7 +95,7 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         super().__init__(stage, tab)
 
     def panel(self) -> Sequence[Node]:
-        f, found, s, units = self.read, self.read.found, self.settings, self.stage.units
+        f, found, s, units = self.read, self.read.found, self.settings, self.stage.display.units
         legend, facts, pick = (Html(str, key=key) for key in ("legend", "facts", "pick"))
         if found is not None and s.request is not None:
             locked = s.request.constraints.locks(s.request.robot)
@@ -152,7 +152,7 @@ class Capability(DeclaredFeature[MapSettings, MapFacts]):
         s = self.settings
         if s.request is None or s.stopped is not None:
             return ()
-        return [Work("map", self.stage.maps.subscribe, (s.request,), poll=POLL)]
+        return [Work("map", self.stage.services.maps.subscribe, (s.request,), poll=POLL)]
 
     def worked(self, key: str) -> None:
         found = self.facts.found

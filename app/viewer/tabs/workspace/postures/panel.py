@@ -150,7 +150,7 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
         f, nodes = self.facts, list[Lazy]()
         drawn = f.map if f.settings.drawn else None
         if drawn is not None and drawn.plane.joints is None:
-            nodes.append(Lazy("section", views.section_nodes, (drawn, self.stage.dark)))
+            nodes.append(Lazy("section", views.section_nodes, (drawn, self.stage.display.dark)))
         if drawn is not None and f.settings.postures and not self.hides("postures"):
             nodes.append(Lazy("ghosts", self._ghosts, (f.robot, f.settings.postures, f.shown)))
         if f.drivable is not None and f.settings.drawn:
@@ -170,7 +170,7 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
     def running(self) -> Sequence[Work | Sweep]:
         s, works = self.settings, list[Work | Sweep]()
         if s.request is not None:
-            works.append(Work("map", self.stage.summaries.postures, (s.request,), poll=POLL))
+            works.append(Work("map", self.stage.services.summaries.postures, (s.request,), poll=POLL))
         if s.judged is not None:
             works.append(Work("cuspidal", self._judge, (self.facts.robot, s.judged)))
         if s.loop is not None:
@@ -183,7 +183,7 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
 
     def on_start(self) -> None:
         """Compute a map for the arm as it is."""
-        arm, s = self.stage.now, self.settings
+        arm, s = self.stage.arm.now, self.settings
         T = tuple(map(tuple, arm.T_tool.tolist()))
         joints = None if s.plane != "joints" else (1, 2) if arm.robot.n > 2 else (0, 1)
         request = PostureRequest(
@@ -224,20 +224,20 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
     def _go_to(self, found: PostureMap, place: tuple[float, float]) -> None:
         """Move the arm to a place of the map, and list the postures there."""
         assert self.settings.request is not None
-        there = views.postures_at(found, self.settings.request, place, self.stage.now.goal)
+        there = views.postures_at(found, self.settings.request, place, self.stage.arm.now.goal)
         self.change(place=place, postures=there)
         if found.plane.joints is None:
-            self.stage.set_target(found.plane.poses(found.robot, np.array([place]))[0])
+            self.stage.arm.set_target(found.plane.poses(found.robot, np.array([place]))[0])
         else:
             q = found.plane.configurations(np.array([place]))[0]
             self._move(q, Notice("hand", "Moved to a place in the map", "Two joints have its values."))
 
     def _move(self, q: Array, notice: Notice) -> None:
         """Move the arm to a configuration ``(n,)``, or say which joint is locked."""
-        if (held := locked(self.stage.now, q)) is not None:
-            self.stage.notify(held)
+        if (held := locked(self.stage.arm.now, q)) is not None:
+            self.stage.status.show(held)
         else:
-            self.stage.move_to(q, notice)
+            self.stage.arm.move_to(q, notice)
 
     def on_posture(self, index: int) -> None:
         """Move the arm to a posture of the list, or say why it cannot go there."""
@@ -249,26 +249,26 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
             self._move(posture.q, Notice("hand", words, "The tool is at the place in the map."))
         else:
             words = f"Not available: {short(posture.name)}"
-            self.stage.notify(Notice("limits", words, "It is outside the limits."))
+            self.stage.status.show(Notice("limits", words, "It is outside the limits."))
 
     def _judge(self, robot: Robot, constraints: JointConstraints) -> Subscription[Cuspidality]:
         compute = partial(views.judge, robot, constraints)
-        return self.stage.summaries.once(("cuspidal", robot, constraints), compute)
+        return self.stage.services.summaries.once(("cuspidal", robot, constraints), compute)
 
     def on_judge(self) -> None:
         """Find out whether the arm is cuspidal, with its present limits and locks."""
-        self.change(judged=self.stage.now.options.constraints, loop=None)
+        self.change(judged=self.stage.arm.now.options.constraints, loop=None)
 
     def on_loop(self) -> None:
         """Move to the start of the loop, and go round it."""
         found = self.facts.drivable
         if found is None or found.loop is None:
             return
-        if (held := locked(self.stage.now, found.loop)) is not None:
-            self.stage.notify(held)
+        if (held := locked(self.stage.arm.now, found.loop)) is not None:
+            self.stage.status.show(held)
         else:
             self.change(loop=Drive.straight(found.loop))
-            self.stage.move_to(found.loop[0], START)
+            self.stage.arm.move_to(found.loop[0], START)
             self.invalidate()
             self._play(FRAME)  # if it is there already: the press is a step that can be undone
 
@@ -278,14 +278,14 @@ class Postures(DeclaredFeature[PostureSettings, MapFacts]):
 
     def _play(self, seconds: float) -> None:
         """A frame on the loop; another motion of the arm ends it."""
-        arm, drive, found = self.stage.now, self.settings.loop, self.facts.drivable
+        arm, drive, found = self.stage.arm.now, self.settings.loop, self.facts.drivable
         if drive is None or found is None or not np.array_equal(drive.here, arm.goal):
             self.change(loop=None)
         elif (held := locked(arm, drive.q[drive.passed :])) is not None:
             self.change(loop=None)
-            self.stage.notify(held)
+            self.stage.status.show(held)
         elif np.array_equal(arm.q, arm.goal):  # it has come to the start
             drive = drive.after(seconds)
             self.change(loop=None if drive.arrived else drive)
-            notice = views.came_back(found, self.stage.units) if drive.arrived else views.under_way(found)
-            self.stage.move_to(drive.here, notice, at_once=True)
+            notice = views.came_back(found, self.stage.display.units) if drive.arrived else views.under_way(found)
+            self.stage.arm.move_to(drive.here, notice, at_once=True)
