@@ -34,7 +34,6 @@ from app.viewer.session.controller import ArmController
 from app.viewer.session.services import Services
 from kin import IKResult, InputError
 from kin.collision import Contact
-from kin.transforms import Array
 
 SAVED = "Your browser has put it where it puts downloads."
 
@@ -133,17 +132,14 @@ class Feature:
     def on_robot(self) -> None:
         """Another robot was selected. Not called for the robot that is there when the feature is constructed."""
 
-    def on_pose(self, T_base_tool: Array) -> None:
-        """The scene shows the arm at another ``stage.arm.now.q``, with the tool at this pose ``(4, 4)``."""
+    def on_arm_changed(self) -> None:
+        """``stage.arm.now`` is another one: called once at the end of a step, however much has changed in it."""
 
     def on_result(self, result: IKResult) -> None:
         """Inverse kinematics was solved for a target."""
 
     def on_request(self) -> None:
         """The task, the requested branch, or the locked joints changed."""
-
-    def on_obstacles(self) -> None:
-        """There are other obstacles, or the arm avoids them from now on, or no longer."""
 
     def on_contacts(self, contacts: Sequence[Contact]) -> None:
         """What the arm touches has changed; the deepest contact first."""

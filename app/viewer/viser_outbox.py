@@ -47,11 +47,27 @@ class LoopWaker:
         self.loop = loop
         self._waiting: deque[Callable[[], None]] = deque()
         self._woken = False
+        self._here = threading.local()  # `held`: whether the calls of this thread are held
+
+    @contextlib.contextmanager
+    def together(self) -> Iterator[None]:
+        """Wake the loop once, at the end, for what this thread calls within this context."""
+        self._here.held = True
+        try:
+            yield
+        finally:
+            self._here.held = False
+            if self._waiting:
+                self._wake()
 
     def call(self, act: Callable[[], None]) -> None:
         """Have `act` called. Any thread may ask; nothing happens if the loop is closed."""
         # A call is appended before the flag is read, and the flag is cleared before calls are taken: none is lost.
         self._waiting.append(act)
+        if not getattr(self._here, "held", False):
+            self._wake()
+
+    def _wake(self) -> None:
         if not self._woken:
             self._woken = True
             with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
@@ -95,7 +111,7 @@ class Outbox(AsyncMessageBuffer):
         self.flush_event: Any = _Signal(self._flushed)
         self.event_loop: Any = _Direct()
         self._visitor = visitor
-        self._waker = waker
+        self.waker = waker
         self._packer = packer
         self._holding = threading.Lock()
         self._holds = 0
@@ -138,7 +154,7 @@ class Outbox(AsyncMessageBuffer):
                 if self._asked != self._send:
                     self._asked = call
                 return
-        self._waker.call(call)
+        self.waker.call(call)
 
     @contextlib.contextmanager
     def hold(self) -> Iterator[None]:
@@ -152,7 +168,7 @@ class Outbox(AsyncMessageBuffer):
                 self._holds -= 1
                 call, self._asked = (None, self._asked) if self._holds else (self._asked, None)
             if call is not None:
-                self._waker.call(call)
+                self.waker.call(call)
 
     # The event loop's thread
 
@@ -168,7 +184,7 @@ class Outbox(AsyncMessageBuffer):
         if self.done:
             self._send()
         elif self._timer is None:
-            self._timer = self._waker.loop.call_later(self.window_duration_sec, self._send)
+            self._timer = self.waker.loop.call_later(self.window_duration_sec, self._send)
 
     async def send_to(self, connection: Connection) -> None:
         """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`."""
@@ -177,7 +193,7 @@ class Outbox(AsyncMessageBuffer):
                 if window := self._take():
                     await connection.send(self._packer.pack(window))
                 else:
-                    self._waiter = self._waker.loop.create_future()
+                    self._waiter = self.waker.loop.create_future()
                     await self._waiter
         finally:
             if self._timer is not None:
@@ -273,7 +289,7 @@ def in_one_frame(client: viser.ClientHandle) -> Iterator[None]:
     """Send all that is pushed and flushed for a visitor within this context together, at its end."""
     buffer = client._websock_connection.get_message_buffer() if viser_names.OUTBOX.is_there else None
     if isinstance(buffer, Outbox):
-        with buffer.hold():
+        with buffer.waker.together(), buffer.hold():
             yield
     else:  # viser's own buffer
         yield

@@ -162,10 +162,12 @@ class Found:
         if self.curves:
             return 0
         branches, rare = self._branches, [k for k, p in enumerate(self._branches.redundancies) if p.rare]
-        every = branches.q[self._every]
-        alone = [row for row in self._order if np.isnan(branches.values[row, rare]).all()]
-        same = (np.abs(every - branches.q[row]).max(axis=1) <= TOLERANCES.merge for row in alone)
-        return sum(int(rows.sum()) > 1 for rows in same)
+        if len(self._every) == 1:
+            return 0
+        rows = np.array(self._order)
+        alone = rows[np.isnan(branches.values[rows][:, rare]).all(axis=1)]
+        apart = np.abs(branches.q[alone][:, None] - branches.q[self._every]).max(axis=2)
+        return int(np.count_nonzero((apart <= TOLERANCES.merge).sum(axis=1) > 1))
 
     @property
     def singularities(self) -> tuple[Singularity, ...]:

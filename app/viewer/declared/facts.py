@@ -34,8 +34,10 @@ class ArmReads:
     def follow(self, arm: Arm) -> bool:
         """Stand for another arm if all values read so far are the same there; returns whether they are."""
         if arm is not self._arm:
-            if not all(same((value,), (getattr(arm, name),)) for name, value in self._read.items()):
-                return False
+            for name, value in self._read.items():
+                other = getattr(arm, name)
+                if other is not value and not same((other,), (value,)):
+                    return False
             self._arm = arm
         return True
 

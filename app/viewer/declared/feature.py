@@ -33,8 +33,7 @@ from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.work import Runner, Sweep, Work
 from app.viewer.feature import Feature, Stage
 from app.viewer.views.templates import render
-from kin import IKResult, InputError
-from kin.transforms import Array
+from kin import InputError
 
 S = TypeVar("S", bound=Settings)
 F = TypeVar("F", bound=Facts[Any])
@@ -94,6 +93,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
     @property
     def due(self) -> float | None:
         """See `Feature`: its own, or that of a part, whichever is earlier."""
+        if not self._parts:
+            return self._due
         dues = self._due, *(part.due for part in self._parts.values())
         return min((due for due in dues if due is not None), default=None)
 
@@ -213,22 +214,22 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def invalidate(self) -> None:
         """Make `facts` anew if something that they were made of has changed."""
-        facts, stage = self.facts, self.stage
+        facts, stage, arm = self.facts, self.stage, self.stage.arm.now
         same = (
             facts.settings is self.settings
             and facts.works is self._runner.results
             and facts.units == stage.display.units
         )
-        if not (same and self._reads.follow(stage.arm.now)):
-            self._reads = ArmReads(stage.arm.now)
+        if not (same and self._reads.follow(arm)):
+            self._reads = ArmReads(arm)
             self.facts = self._facts()
 
     def _facts(self) -> F:
         results, units = self._runner.results, self.stage.display.units
         return cast(F, self.facts_of(self.settings, cast(Arm, self._reads), results, units, **self.sources()))
 
-    def _follow(self) -> None:
-        """Show what has changed with the arm: the scene at once, the panel at its pace."""
+    def catch_up(self) -> None:
+        """Show what has changed with the arm or the settings: the scene at once, the panel at its pace."""
         if self._outdated:
             return
         self.invalidate()
@@ -245,7 +246,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
     @property
     def _outdated(self) -> bool:
         """Whether there is another robot for which `on_robot` has not been called yet."""
-        return self.facts.robot != self.stage.arm.now.robot
+        before, now = self.facts.robot, self.stage.arm.now.robot
+        return before is not now and before != now  # one is asked of every feature in every frame
 
     @property
     def _interval(self) -> float:
@@ -316,21 +318,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._begin()
         self.for_parts(lambda part: part.on_robot())
 
-    def on_pose(self, T_base_tool: Array) -> None:
-        self._follow()
-        self.for_parts(lambda part: part.on_pose(T_base_tool))
-
-    def on_result(self, result: IKResult) -> None:
-        self._follow()
-        self.for_parts(lambda part: part.on_result(result))
-
-    def on_request(self) -> None:
-        self._follow()
-        self.for_parts(lambda part: part.on_request())
-
-    def on_obstacles(self) -> None:
-        self._follow()
-        self.for_parts(lambda part: part.on_obstacles())
+    def on_arm_changed(self) -> None:
+        self.catch_up()
+        for part in self._parts.values():
+            part.on_arm_changed()
 
     def on_style(self) -> None:
         self._begin()

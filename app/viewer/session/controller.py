@@ -182,7 +182,6 @@ class ArmController:
     def _surroundings_changed(self, solve_again: bool) -> None:
         if solve_again:
             self._request_changed()
-        self._listener.on_obstacles()
         self._listener.on_pose(kin.fk(self.robot, self.q))
 
     # Motions

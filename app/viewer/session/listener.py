@@ -36,6 +36,3 @@ class ArmListener(Protocol):
 
     def on_branch(self, branch: str | None) -> None:
         """The requested branch was changed by something other than the visitor's choice in the panel."""
-
-    def on_obstacles(self) -> None:
-        """There are other obstacles, or another choice whether the arm avoids them."""

@@ -19,6 +19,7 @@ from app.live import Listener, reserved
 from app.shared.security import Rights
 from app.viewer import viser_names
 from app.viewer.activity.activity import Activity
+from app.viewer.arm import Arm
 from app.viewer.feature import Feature
 from app.viewer.labels import size_labels, text_factor
 from app.viewer.live.feature import Connect
@@ -132,6 +133,7 @@ class VisitorPage(Worker):
         )
         self.looks = Looks(self)
         self.live = LiveInput(self)
+        self._told: Arm | None = None  # the arm that features have heard of
         self._actions = Actions(self, self.live, self.looks)
 
     @property
@@ -171,11 +173,11 @@ class VisitorPage(Worker):
         for feature in self.features:
             self._guard(lambda feature=feature: action(feature))  # type: ignore[misc]
 
-    def _tell(self, name: str, *args: object) -> None:
-        """Call the method of this name of every feature that has one of its own; often, while an arm moves."""
-        for feature in self.features:
-            if getattr(type(feature), name) is not getattr(Feature, name):
-                self._guard(partial(getattr(feature, name), *args))
+    def _tell(self) -> None:
+        """Tell every feature that the arm is another one, if it is."""
+        if self.arm.now is not self._told:
+            self._told = self.arm.now
+            self.for_features(lambda feature: feature.on_arm_changed())
 
     # Reports of the page's parts
 
@@ -209,7 +211,6 @@ class VisitorPage(Worker):
 
     def on_pose(self, T_base_tool: Array) -> None:
         self.numbers.use_pose()
-        self._tell("on_pose", T_base_tool)
 
     def on_goal(self, dragged: int | None) -> None:
         self.numbers.use_goal(dragged)
@@ -229,7 +230,9 @@ class VisitorPage(Worker):
         self.posture.use_result(result)
         self.status.show_result(result, self.display.units)
         self.numbers.use_result(result)
-        self._tell("on_result", result)
+        for feature in self.features:
+            if type(feature).on_result is not Feature.on_result:  # few have one, and targets come often
+                self._guard(partial(feature.on_result, result))
 
     def on_lock(self, locks: Sequence[bool]) -> None:
         self.status.show(lock_notice(locks))
@@ -243,9 +246,6 @@ class VisitorPage(Worker):
 
     def on_branch(self, branch: str | None) -> None:
         self.posture.choose(branch)
-
-    def on_obstacles(self) -> None:
-        self.for_features(lambda feature: feature.on_obstacles())
 
     # Worker
 
@@ -280,6 +280,7 @@ class VisitorPage(Worker):
                     # Guarded one by one, so that one bad value does not discard the others.
                     self._guard(lambda key=key, value=value: self._act(key, value))  # type: ignore[misc]
                 self.arm.draw(fresh=bool(batch))
+                self._tell()
                 if self.arm.target is None:
                     self.numbers.hide_target()
                 now = time.perf_counter()
@@ -365,6 +366,7 @@ class VisitorPage(Worker):
             self._build_tabs()
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
+            self._tell()
             self.picture.show_hints(self.rights.compute)
             learns = self._persistence.stored.lesson is not None
             self.channel.show("start", [self._persistence.begin(self.panel.share), LEARN if learns else ""])

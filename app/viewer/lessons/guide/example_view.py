@@ -76,7 +76,7 @@ class ExampleView:
         self._scene.remove()
         self._stage.picture.show_all()
 
-    def on_pose(self) -> bool:
+    def on_arm_changed(self) -> bool:
         """The visitor's arm moves: who moves it wants to see it; returns whether the example has ended."""
         if self._left is None or (self._left == self._stage.arm.now.goal).all():
             return False

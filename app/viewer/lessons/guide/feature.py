@@ -250,10 +250,10 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self._follow_steps()
         super().on_robot()
 
-    def on_pose(self, T_base_tool: Array) -> None:
-        if self._example.on_pose():
+    def on_arm_changed(self) -> None:
+        if self._example.on_arm_changed():
             self.schedule()
-        super().on_pose(T_base_tool)
+        super().on_arm_changed()
 
     def tick(self, now: float) -> None:
         before = self._example.words

@@ -198,7 +198,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def on_result(self, result: kin.IKResult) -> None:
         self.change(turned=False)
-        super().on_result(result)
+        self.catch_up()
 
     def on_robot(self) -> None:
         self._arms[self.facts.robot] = self.settings

@@ -171,19 +171,19 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
 
     def on_result(self, result: IKResult) -> None:
         self.change(result=result)
-        super().on_result(result)
+        self.catch_up()
 
     def started(self) -> None:
         now = self.stage.arm.now
         self.change(drive=loop.driven(now.robot, None, now.q) if self.settings.round else None)
 
-    def on_pose(self, T_base_tool: Array) -> None:
+    def on_arm_changed(self) -> None:
         if self.settings.round and not self._outdated:
             before = self.settings.drive
             drive = loop.driven(self.stage.arm.now.robot, before, self.stage.arm.now.q)
             if drive is not before:
                 self.change(drive=drive)
-        super().on_pose(T_base_tool)
+        super().on_arm_changed()
 
     def on_steps(self, progress: Progress) -> Outline | None:
         at, steps = progress.at, progress.outline.steps

@@ -108,11 +108,11 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         self.change(swing=False, target=None)
         if self.read.item is not None:
             self.change(side=self._on_side(self.read.item).value)
-        super().on_result(result)
+        self.catch_up()
 
     def on_request(self) -> None:
         self.change(target=None)
-        super().on_request()
+        self.catch_up()
 
     # The ends of the ranges
 

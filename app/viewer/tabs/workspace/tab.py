@@ -34,7 +34,6 @@ from app.viewer.tabs.workspace.section import panel as section
 from app.viewer.tabs.workspace.section.plot import Density, frame_of
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
-from kin.transforms import Array
 from kin.units import grouped
 from kin.workspace import CapabilityMap
 
@@ -188,7 +187,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
 
     def on_request(self) -> None:
         self._clouds.report()  # shows the locked joints
-        super().on_request()
         self.due = 0.0
 
     def on_style(self) -> None:
@@ -196,9 +194,9 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         self._clouds.show_legend()
         super().on_style()
 
-    def on_pose(self, T_base_tool: Array) -> None:
+    def on_arm_changed(self) -> None:
         self._window.arm_moved()
-        super().on_pose(T_base_tool)
+        super().on_arm_changed()
 
     def tick(self, now: float) -> None:
         self._clouds.advance(now)

@@ -292,13 +292,13 @@ def test_a_panel_and_a_scene_that_do_not_read_the_configuration_are_not_made_aga
         made = still.panels, still.scenes
         for k in range(1, 4):
             page.now = replace(page.now, q=UR5.q_home + 0.1 * k)
-            still.on_pose(page.now.T_tool)
+            still.on_arm_changed()
             page.rest()
         assert (still.panels, still.scenes) == made
         assert still.read.q is page.now.q, "facts are those of the arm on show"
         for k in range(1, 4):
             page.now = replace(page.now, goal=UR5.q_home + 0.1 * k)
-            still.on_pose(page.now.T_tool)
+            still.on_arm_changed()
             page.rest()
         assert still.panels == made[0] + 3
 
