@@ -120,7 +120,7 @@ class MotionRequest(AvoidingBody, WorkpiecesBody):
     },
 )
 async def motion(request: Request, robot: Robot, body: MotionRequest) -> Response:
-    """A program of PTP, LIN, CIRC, spline and dwell segments, timed so that no joint exceeds its limits.
+    """A program of PTP, LIN, CIRC, spline, dwell and gripper segments, timed so that no joint exceeds its limits.
 
     A program that cannot be driven is answered with 200 and `planned` false, in JSON whatever the format:
     `refusal` holds the segment, the place on its path, the cause as a code with its numbers, and what would help,

@@ -13,6 +13,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from app.api.schemas import Number, Vector3, Vector4, numbers
 from kin.motion.program import (
+    GRIPPER_TIME,
     LONGEST_DWELL,
     LONGEST_NAME,
     MOST_POINTS,
@@ -108,8 +109,22 @@ class DwellSegment(_Described):
     name: Name = Field("", description="For people.")
 
 
+class GripperSegment(_Described):
+    """The gripper opens or closes, and the arm waits for it where the segment before ended."""
+
+    kind: Literal["gripper"] = Field(description="The gripper.")
+    opening: float = Field(
+        ge=0.0, le=1.0, description="How far it is open then, a part of its range: 0 is closed, 1 open."
+    )
+    seconds: float = Field(
+        GRIPPER_TIME, ge=0.0, le=LONGEST_DWELL, description="How long it moves and the arm waits, in seconds."
+    )
+    name: Name = Field("", description="For people.")
+
+
 Segment = Annotated[
-    PtpSegment | LinSegment | CircSegment | SplineSegment | DwellSegment, Field(discriminator="kind")
+    PtpSegment | LinSegment | CircSegment | SplineSegment | DwellSegment | GripperSegment,
+    Field(discriminator="kind"),
 ]
 SEGMENTS: tuple[type[BaseModel], ...] = get_args(get_args(Segment)[0])
 

@@ -26,7 +26,7 @@ from app.exports.motion_plot import motion_plot
 from app.exports.motion_samples import with_joint_names
 from app.shared.answers.motion import motion_answer
 from kin import InputError, Robot, plan_motion
-from kin.motion import Motion, Program, parse_program, program_from_dict
+from kin.motion import Motion, Program, SegmentTimes, parse_program, program_from_dict
 from kin.transforms import Array
 from kin.units import Unit
 
@@ -150,10 +150,16 @@ def _write(path: str, motion: Motion, kind: MotionFormat, rate: float, quiet: bo
         print(f"\n{path}: {motion.duration:.3f} s, {size} bytes")
 
 
+def _name(times: SegmentTimes) -> str:
+    """The name of a segment, and how far it opens the gripper."""
+    opening = "" if times.opening is None else f"to {clean(100.0 * times.opening, 1)} %"
+    return " ".join(filter(None, (opening, times.name)))
+
+
 def _report(motion: Motion, units: Notation) -> str:
     """When each segment is driven, and the peaks."""
     segments = [
-        [str(each.index + 1), each.kind, each.name, f"{each.start:.3f}", f"{each.end:.3f}"]
+        [str(each.index + 1), each.kind, _name(each), f"{each.start:.3f}", f"{each.end:.3f}"]
         for each in motion.segments
     ]
     peaks = []

@@ -16,7 +16,7 @@ from app.shared.answers.answer import as_plain
 from app.shared.answers.motion import motion_answer
 from kin import InputError, fk
 from kin.axes import inverse
-from kin.motion import Circ, Dwell, Lin, Motion, PoseTarget, Ptp, Spline, program_to_dict
+from kin.motion import Circ, Dwell, Gripper, Lin, Motion, PoseTarget, Ptp, Spline, program_to_dict
 from kin.motion.details import BlendLeftOut, BlendShortened
 from kin.motion.program import Move, Segment
 from kin.transforms import Array, wxyz_from_rotation
@@ -139,9 +139,12 @@ def _target(motion: Motion, segment: Segment, end: float) -> tuple[Array, Array]
 
 def _commands(motion: Motion, segment: Segment, q: Array, T: Array, index: int) -> list[str]:
     """The commands of one segment that ends at `q` ``(6,)`` with the tool at `T` in the base frame."""
+    label = f"  # {segment.name}" if segment.name.isprintable() and segment.name else ""
     if isinstance(segment, Dwell):
         return [f"sleep({_number(segment.seconds)})"]
-    label = f"  # {segment.name}" if segment.name.isprintable() and segment.name else ""
+    if isinstance(segment, Gripper):
+        words = f"# gripper {100.0 * segment.opening:.6g} % open: the command of your gripper goes here"
+        return [words, f"sleep({_number(segment.seconds)}){label}"]
     radius = _radius(motion, segment, index)
     blend = f", r={_number(radius)}" if radius else ""
     limits = motion.limits

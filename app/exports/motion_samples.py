@@ -59,7 +59,18 @@ def about(motion: Motion) -> list[tuple[str, str]]:
             for name, values, per in rows
         ),
         ("assumed", ", ".join(assumed) or "none of these"),
+        *_gripper(motion),
     ]
+
+
+def _gripper(motion: Motion) -> list[tuple[str, str]]:
+    """When the gripper moves, and how far it is open then: joint values do not say it. Empty if it does not."""
+    moves = [
+        f"{each.opening!r} from {each.start!r} s to {each.end!r} s"
+        for each in motion.segments
+        if each.opening is not None
+    ]
+    return [("gripper, 0 closed to 1 open", ", ".join(moves))] if moves else []
 
 
 def _unit(joint: Joint) -> str:

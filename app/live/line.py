@@ -18,11 +18,12 @@ from typing import Any, Final
 from app.classroom.tokens import new_code
 from app.live.codes import unused_code
 from app.live.recording import Recording
-from app.live.recording.recording import SHOWN
+from app.live.recording.recording import OPENED, SHOWN
 from app.shared.problems import Problem
 from kin import Robot
 
-VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a program may subscribe to
+# What a program may subscribe to.
+VALUES: Final = ("q", "gripper", "target", "result", "contacts", "program")
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
 QUIET: Final = frozenset({"drives", "readings", "measured", "draw", "clear"})  # changes nothing that undo restores
@@ -226,6 +227,8 @@ class Line:
         recording = self.recording
         if name == "q" and recording is not None:
             recording.add(SHOWN, {"q": value.tolist()})  # type: ignore[attr-defined]
+        if name == "gripper" and recording is not None and value is not None:
+            recording.add(OPENED, {"gripper": value})
         if program is not None and (name in program.wants or name == "robot"):
             program.wake()
 

@@ -31,14 +31,14 @@ from kin import KinematicsError
 
 IDLE: Final = 120.0  # s
 ANSWER: Final = 20.0  # s for an answer of the page
-SHOWN: Final = ("q", "target", "result", "contacts", "program")
+SHOWN: Final = ("q", "gripper", "target", "result", "contacts", "program")
 # Of a message: what an agent that moves no machine has to say.
-FIELDS: Final = ("robot", "q", "target", "obstacles", "program", "play", "draw", "clear")
+FIELDS: Final = ("robot", "q", "gripper", "target", "obstacles", "program", "play", "draw", "clear")
 DESCRIPTION: Final = (
     "Says what an open page of the dashboard is to show, and answers with what it shows then: robot, joint values "
-    "q, target, the result of inverse kinematics, contacts, program. The person who has the page open presses "
-    "Connect a program in its tab Program, and tells you the code. The page shows your name and a Stop. Without "
-    "other arguments than the code, nothing is changed."
+    "q, gripper, target, the result of inverse kinematics, contacts, program. The person who has the page open "
+    "presses Connect a program in its tab Program, and tells you the code. The page shows your name and a Stop. "
+    "Without other arguments than the code, nothing is changed."
 )
 # Parts of a message that another tool describes.
 KNOWN: Final = {

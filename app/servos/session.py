@@ -1,6 +1,6 @@
 """A session with a page and an arm: a mirror that writes nothing, until the owner says *enable*; then it follows.
 
-The owner types `COMMANDS`. The gripper moves no joint of the model, so it has a number of its own.
+The owner types `COMMANDS`. The gripper moves no joint of the model: it follows the page's slider of the gripper.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ CYCLE: Final = 0.02  # s
 RESTING: Final = 0.5  # s between two tries of a bus whose servos do not answer
 COMMANDS: Final = """Type and press Enter:
   enable      the arm follows the page, from where it is
-  gripper 40  the gripper: 0 is closed, 100 is open (after enable)
+  gripper 40  the gripper, as its slider in the page: 0 is closed, 100 is open (after enable)
   stop        hold the arm where it is
   release     switch the motors off: hold the arm with your hand
   quit        end"""
@@ -56,13 +56,19 @@ class Gripper:
         """Whether it has a goal."""
         return not np.isnan(self._wanted)
 
-    def go(self, percent: float) -> None:
-        """From now on it goes there: 0 is closed, 100 open."""
+    @property
+    def opening(self) -> float:
+        """How far it is open, from 0 (closed) to 1 (open)."""
+        here = float(self._bus.positions([self.motor])[0])
+        return float(np.clip((here - self._closed) / (self._open - self._closed), 0.0, 1.0))
+
+    def go(self, opening: float) -> None:
+        """From now on it goes there: 0 is closed, 1 open."""
         if not self.on:
             self._asked = float(self._bus.positions([self.motor])[0])
             self._bus.hold([self.motor])  # the goal first: a servo that is switched on goes to its last one
             self._bus.switch([self.motor], True)
-        self._wanted = self._closed + percent / 100.0 * (self._open - self._closed)
+        self._wanted = self._closed + opening * (self._open - self._closed)
 
     def step(self, seconds: float) -> None:
         """Go on, at a limited speed and not far ahead of where it is: what it holds, it squeezes no harder."""
@@ -112,6 +118,7 @@ class Session:
         self._motors = moving(self._robot)
         motor = gripper_of(self._robot)
         self._gripper = None if motor is None else Gripper(bus, motor)
+        self._opening: float | None = None  # that the page's gripper had last, while the arm follows
         self._enabled = False
 
     def run(self, release: bool = False) -> None:
@@ -224,6 +231,7 @@ class Session:
             bus.switch(motors, True)
             q = scale.q(bus.positions(motors))
             guide = Guide(page, f"{self._arm.name} at {bus.port}", self._speed, q, scale.limits)
+            self._show_gripper()
             print("The arm follows the page.", flush=True)
             while (word := self._next()) not in ("stop", "release", "quit"):
                 self._command(word)
@@ -232,8 +240,7 @@ class Session:
                 before = guide.asked
                 if not np.array_equal(guide.step(q, heard), before):
                     self._write(scale, guide.asked, guide.commanded)
-                if self._gripper is not None:
-                    self._gripper.step(CYCLE)
+                self._follow_gripper()
                 time.sleep(CYCLE)
             release = word == "release" or (release and word == "quit")
             return word
@@ -258,7 +265,28 @@ class Session:
         elif not 0.0 <= percent <= 100.0:
             print(f"gripper: got {value[:40]!a}, expected a number from 0 (closed) to 100 (open).", flush=True)
         else:
-            self._gripper.go(percent)
+            self._gripper.go(percent / 100.0)
+            self._show_opening(percent / 100.0)
+
+    def _show_opening(self, opening: float) -> None:
+        """Have the page's gripper open so far, if its arm has one; `_follow_gripper` waits for other values."""
+        if self._page.gripper is not None:
+            self._page.gripper = self._opening = opening
+
+    def _show_gripper(self) -> None:
+        """Have the page take over how far the gripper is open, so that it does not move at first."""
+        self._opening = None
+        if self._gripper is not None:
+            self._show_opening(round(self._gripper.opening, 3))
+
+    def _follow_gripper(self) -> None:
+        """Lead the gripper on, to where the page's gripper has been moved since it was taken over."""
+        if self._gripper is None:
+            return
+        before, self._opening = self._opening, self._page.gripper
+        if before is not None and self._opening is not None and self._opening != before:
+            self._gripper.go(self._opening)
+        self._gripper.step(CYCLE)
 
     def _write(self, scale: Scale, q: Array, joints: NDArray[np.bool_]) -> None:
         """Lead the servos of these joints ``(n,)`` to a configuration ``(n,)``, within their calibrated ranges."""

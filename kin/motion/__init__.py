@@ -29,7 +29,20 @@ from kin.motion.limits import MotionLimits, motion_limits
 from kin.motion.planner import planned
 from kin.motion.planning.collisions import checked
 from kin.motion.planning.starts import start_as_recorded
-from kin.motion.program import Circ, Dwell, JointTarget, Lin, Move, PoseTarget, Program, Ptp, Segment, Spline
+from kin.motion.program import (
+    Circ,
+    Dwell,
+    Gripper,
+    JointTarget,
+    Lin,
+    Move,
+    Pause,
+    PoseTarget,
+    Program,
+    Ptp,
+    Segment,
+    Spline,
+)
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
 from kin.motion.results import InMotion, Motion, MotionSample, Peak, Refusal, SegmentTimes
 from kin.named import robot_of
@@ -41,6 +54,7 @@ _ROUNDING = 1e-9  # part of a speed
 __all__ = [
     "Circ",
     "Dwell",
+    "Gripper",
     "JointTarget",
     "Lin",
     "Motion",
@@ -64,7 +78,7 @@ __all__ = [
 
 def plan_motion(
     robot: Robot | str,
-    program: Program | Mapping[str, Any] | Sequence[Move | Dwell],
+    program: Program | Mapping[str, Any] | Sequence[Move | Pause],
     q_start: ArrayLike | None = None,
     *,
     qd_start: ArrayLike | None = None,
@@ -122,7 +136,7 @@ def plan_motion(
     return found
 
 
-def _program_of(program: Program | Mapping[str, Any] | Sequence[Move | Dwell], robot: Robot) -> Program:
+def _program_of(program: Program | Mapping[str, Any] | Sequence[Move | Pause], robot: Robot) -> Program:
     if isinstance(program, Program):
         return program
     if isinstance(program, Mapping):

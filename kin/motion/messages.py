@@ -159,8 +159,8 @@ def note(fact: Note, units: Units) -> str:
             return f"The limits of jerk cost {duration - without:.3f} s ({share:.1f} %) on {which}."
 
 
-def summary(motions: int, pauses: int, duration: float) -> str:
-    """A planned motion: how many segments move the arm, how many let it wait, and how long it takes."""
-    counts = ((motions, "motion"), (pauses, "pause"))
+def summary(motions: int, pauses: int, grips: int, duration: float) -> str:
+    """A planned motion: how many segments move the arm, let it wait, move the gripper, and how long it takes."""
+    counts = ((motions, "motion"), (pauses, "pause"), (grips, "gripper move"))
     parts = [f"{number} {name}{'s' * (number != 1)}" for number, name in counts if number]
     return f"{listed(parts)} in {duration:.3f} s." if parts else "No motion: the arm is there already."

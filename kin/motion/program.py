@@ -20,11 +20,12 @@ from kin.poses import check_length
 from kin.transforms import Array, as_transform, pose_from_position_wxyz, wxyz_from_rotation
 
 Orientation = Literal["geodesic", "two-axis"]
-Kind = Literal["ptp", "lin", "circ", "spline", "dwell"]
+Kind = Literal["ptp", "lin", "circ", "spline", "dwell", "gripper"]
 ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
 TASKS: tuple[Task, ...] = ("pose", "approach", "position")
 MOST_SEGMENTS, MOST_POINTS, MOST_VALUES = 1000, 200, 32
 LONGEST_NAME, LONGEST_DWELL = 120, 3600.0
+GRIPPER_TIME = 2.0  # s: what servos of the SO-101 need from closed to open at the speed of `kinboard so101`
 _POSE = (4, 4)
 _FAR = 1e6  # metres or radians
 
@@ -126,7 +127,7 @@ class MoveOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move:
-    """What all segments but a dwell have.
+    """What all segments have in which the arm moves.
 
     Attributes:
         speed, acceleration: parts of the joint limits that the segment may use, above 0 and at most 1. The
@@ -279,12 +280,17 @@ class Spline(Move):
         return self.points[-1]
 
 
-@dataclass(frozen=True, slots=True)
-class Dwell:
-    """A pause at the place where the segment before ended."""
+class Pause:
+    """What the segments have in which the arm stands still where the segment before ended.
 
+    Attributes:
+        seconds: how long.
+        name: shown to people.
+    """
+
+    __slots__ = ()
     seconds: float
-    name: str = ""
+    name: str
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -296,8 +302,52 @@ class Dwell:
         _check_name(self.name)
 
 
-Segment = Ptp | Lin | Circ | Spline | Dwell
-KINDS: dict[Kind, type[Segment]] = {"ptp": Ptp, "lin": Lin, "circ": Circ, "spline": Spline, "dwell": Dwell}
+@dataclass(frozen=True, slots=True)
+class Dwell(Pause):
+    """A pause at the place where the segment before ended."""
+
+    seconds: float
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Gripper(Pause):
+    """The gripper opens or closes, and the arm waits for it where the segment before ended.
+
+    Attributes:
+        opening: how far the gripper is open then, a part of its range: from 0 (closed) to 1 (open).
+        seconds: how long the arm waits. The gripper moves steadily for so long; one that is slower, or holds
+            something, is not waited for any longer.
+    """
+
+    opening: float
+    seconds: float = GRIPPER_TIME
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        Pause.__post_init__(self)
+        object.__setattr__(self, "opening", checked_opening("opening", self.opening))
+
+
+def checked_opening(field: str, value: object) -> float:
+    """How far a gripper is open, 0 (closed) to 1 (open), as a float; raises `InputError` naming the field."""
+    expected = "a number from 0 (closed) to 1 (open)"
+    opening = finite_number(field, value, expected)
+    if not 0.0 <= opening <= 1.0:
+        raise InputError(field, value, expected)
+    return opening
+
+
+Segment = Ptp | Lin | Circ | Spline | Dwell | Gripper
+KINDS: dict[Kind, type[Segment]] = {
+    "ptp": Ptp,
+    "lin": Lin,
+    "circ": Circ,
+    "spline": Spline,
+    "dwell": Dwell,
+    "gripper": Gripper,
+}
 _KIND_OF: dict[type[Segment], Kind] = {cls: kind for kind, cls in KINDS.items()}
 
 

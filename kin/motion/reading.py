@@ -38,9 +38,9 @@ from kin.motion.program import (
     MOST_POINTS,
     MOST_SEGMENTS,
     Circ,
-    Dwell,
     JointTarget,
     Move,
+    Pause,
     PoseTarget,
     Program,
     Segment,
@@ -58,6 +58,10 @@ from kin.typed import ReadError
 from kin.units import Units
 
 _TARGET = ("q", "position", "wxyz", "pose", "frame")
+_NEEDED = {  # of segments in which the arm stands still
+    "dwell": ("seconds", "the length of the pause in seconds"),
+    "gripper": ("opening", "how far the gripper is open then, from 0 (closed) to 1 (open)"),
+}
 LIMITS = Limits(16_000_000, 4_000_000, 16)  # of a program; a page takes shorter ones
 _TOP = (*field_names(Program), "units", "pendant")
 _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
@@ -165,8 +169,9 @@ def program_to_dict(program: Program) -> dict[str, Any]:
 
 def _segment_to_dict(segment: Segment) -> dict[str, Any]:
     data: dict[str, Any] = {"kind": kind_of(segment)}
-    if isinstance(segment, Dwell):
-        return data | {"seconds": segment.seconds} | ({"name": segment.name} if segment.name else {})
+    if isinstance(segment, Pause):
+        own = {key: getattr(segment, key) for key in field_names(type(segment))}
+        return data | {key: value for key, value in own.items() if key != "name" or value}
     if isinstance(segment, Spline):
         data["points"] = [_target_to_dict(point) for point in segment.points]
     else:
@@ -223,9 +228,10 @@ class _Reader:
         given = {key: self.scaled(key, data[key], where) for key in own if key in data}
         if kind == "spline":
             given["points"] = self.points(data.get("points"), f"{where}.points")
-        elif kind == "dwell":
-            if "seconds" not in data:
-                raise InputError(f"{where}.seconds", None, "the length of the pause in seconds")
+        elif kind in _NEEDED:
+            name, what = _NEEDED[kind]
+            if name not in data:
+                raise InputError(f"{where}.{name}", None, what)
         else:
             given["target"] = self.target(data, where)
         if kind == "circ":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,7 +23,7 @@ from kin.motion.arrivals import Arrival
 from kin.motion.details import Braked, Cause, Help, Note, RefusalDetails
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import Piece
-from kin.motion.program import Dwell, Kind, Program
+from kin.motion.program import Kind, Pause, Program
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 from kin.units import DEFAULT_UNITS, Units
@@ -45,7 +46,8 @@ class SegmentTimes:
     """When a segment is driven, in seconds from the start; blends are shared half and half.
 
     Attributes:
-        arrival: in which configuration it meets its target; None for a pause.
+        arrival: in which configuration it meets its target; None where the arm stands still.
+        opening: how far the gripper is open at its end, 0 (closed) to 1 (open); None if it does not move it.
     """
 
     index: int
@@ -54,6 +56,7 @@ class SegmentTimes:
     start: float
     end: float
     arrival: Arrival | None = None
+    opening: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,9 +226,11 @@ class Motion(Explained):
         if self.refusal is not None:
             return self.refusal.explain(units)
         said = [messages.note(fact, units) for fact in self.notes]
-        pauses = sum(each.kind == "dwell" for each in self.segments)
-        motions = sum(each.kind != "dwell" and each.end > each.start for each in self.segments)
-        return " ".join([messages.summary(motions, pauses, self.duration), *said])
+        kinds = [each.kind for each in self.segments]
+        pauses, grips = kinds.count("dwell"), kinds.count("gripper")
+        moved = [each for each in self.segments if each.kind not in ("dwell", "gripper")]
+        motions = sum(each.end > each.start for each in moved)
+        return " ".join([messages.summary(motions, pauses, grips, self.duration), *said])
 
     def q_before(self, index: int) -> Array | None:
         """Where a segment begins.
@@ -289,6 +294,39 @@ class Motion(Explained):
             if k in (0, len(self.pieces) - 1):
                 out[1:, np.flatnonzero(rows)[(local < 0.0) | (local > piece.duration)]] = 0.0
         return out.reshape(4, *times.shape, self.robot.n)
+
+    def opening(self, t: ArrayLike, before: float = math.nan) -> Array:
+        """How far the gripper is open over time.
+
+        It moves steadily during each of its segments, and stays as it is until the next one.
+
+        Args:
+            t: seconds from the start, a number or an array ``(...)``.
+            before: how far it is open at the start, from 0 (closed) to 1 (open); NaN: that is not known.
+
+        Returns:
+            ``(...)`` from 0 to 1. If `before` is not known, NaN until the first segment of the gripper begins; all
+            of that one has the opening that it asks for.
+
+        Raises:
+            InputError: times that are no finite numbers.
+
+        Examples:
+            >>> import kin
+            >>> motion = kin.plan_motion("planar2r", [kin.motion.Gripper(0.2, 1.0), kin.motion.Gripper(1.0, 1.0)])
+            >>> motion.opening([0.5, 1.5, 2.0])
+            array([0.2, 0.6, 1. ])
+        """
+        times = _times(t)
+        out = np.full(times.shape, before)
+        for each in self.segments:
+            if each.opening is not None:
+                first = each.opening if math.isnan(before) else before
+                seconds = each.end - each.start
+                part = np.clip((times - each.start) / seconds, 0.0, 1.0) if seconds else np.ones(times.shape)
+                moving = (1.0 - part) * first + part * each.opening  # exact at both ends
+                out, before = np.where(times >= each.start, moving, out), each.opening
+        return np.asarray(out)
 
     def sample(self, t: ArrayLike) -> MotionSample:
         """Joints, tool poses and tool speeds; before the start and after the end the arm is at rest.
@@ -373,12 +411,17 @@ class Motion(Explained):
             >>> next(kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5])]).csv_pieces())[:8]
             't,q1,q2,'
         """
-        yield ",".join(tables.columns(self.robot.n)) + "\n"
+        grips = any(each.opening is not None for each in self.segments)
+        yield ",".join(tables.columns(self.robot.n, grips)) + "\n"
         for sample in self.steps(rate):
-            yield tables.lines(sample.t, (sample.q, sample.qd, sample.qdd), sample.T, sample.tool_speed)
+            last = [sample.tool_speed, self.opening(sample.t)] if grips else [sample.tool_speed]
+            yield tables.lines(sample.t, (sample.q, sample.qd, sample.qdd), sample.T, last)
 
     def to_csv(self, file: str | PathLike[str], rate: float = 100.0) -> None:
         """Write a table of samples: time, joint values, speeds, accelerations, pose and speed of the tool.
+
+        Of a program that moves the gripper, the last column, `gripper`, says how far it is open; it is empty
+        before the first segment that does.
 
         Args:
             file: path of the file; one that exists is replaced.
@@ -431,7 +474,7 @@ class Motion(Explained):
             True
         """
         times, segment = self.segments[index], self.program.segments[index]
-        if isinstance(segment, Dwell):
+        if isinstance(segment, Pause):
             return self._peaks(times.start, times.end, 1.0, 1.0, (None, None))
         tool = (segment.tool_speed, segment.tool_turn)
         return self._peaks(times.start, times.end, segment.speed, segment.acceleration, tool)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kin.errors import InputError, finite_number
@@ -19,13 +21,21 @@ def step_times(duration: float, rate: float) -> Array:
     return steps if duration - steps[-1] < 1e-9 else np.append(steps, duration)
 
 
-def columns(n: int) -> list[str]:
-    """The names of the columns for an arm with n joints."""
+def columns(n: int, grips: bool = False) -> list[str]:
+    """The names of the columns for an arm with n joints; `grips`: whether its gripper moves."""
     names = [f"{kind}{i}" for kind in ("q", "qd", "qdd") for i in range(1, n + 1)]
-    return ["t", *names, "x", "y", "z", "qw", "qx", "qy", "qz", "tool_speed"]
+    return ["t", *names, "x", "y", "z", "qw", "qx", "qy", "qz", "tool_speed", *["gripper"] * grips]
 
 
-def lines(t: Array, joints: tuple[Array, Array, Array], T: Array, tool_speed: Array) -> str:
-    """The lines of samples: times ``(k,)``; values, speeds and accelerations ``(k, n)``; poses ``(k, 4, 4)``."""
-    parts = [t[:, None], *joints, T[:, :3, 3], wxyz_from_rotation(T[:, :3, :3]), tool_speed[:, None]]
-    return "".join(",".join(map(repr, row)) + "\n" for row in np.hstack(parts).tolist())
+def lines(t: Array, joints: tuple[Array, Array, Array], T: Array, last: Sequence[Array]) -> str:
+    """The lines of samples; the cell of what is not known (NaN) is empty.
+
+    Args:
+        t: times ``(k,)``.
+        joints: values, speeds and accelerations ``(k, n)``.
+        T: poses of the tool ``(k, 4, 4)``.
+        last: the last columns ``(k,)``: speed of the tool and, where the gripper moves, how far it is open.
+    """
+    parts = [t[:, None], *joints, T[:, :3, 3], wxyz_from_rotation(T[:, :3, :3]), np.stack(last, axis=1)]
+    rows = np.hstack(parts).tolist()
+    return "".join(",".join("" if value != value else repr(value) for value in row) + "\n" for row in rows)

@@ -77,6 +77,7 @@ class BarePage:
         self.frame, self.reading = 1 / 30, 0.05
         self.eye = np.ones(3)  # from the camera's look-at point
         self.own: Any = None
+        self.opening: float | None = None  # of the gripper
         self.legend, self.driven, self.translucent = "", "", False
         self.notices: list[Any] = []
         self.views: list[tuple[Any, ...]] = []

@@ -95,10 +95,11 @@ Drawing = Annotated[PointsDrawing | LineDrawing | FrameDrawing | LabelDrawing, F
 class Subscription(Body):
     """What the program wants to hear."""
 
-    values: list[Literal["q", "target", "result", "contacts", "program"]] = Field(
+    values: list[Literal["q", "gripper", "target", "result", "contacts", "program"]] = Field(
         max_length=len(VALUES),
-        description="q: the configuration on show. target: the pose that the arm is asked for, null while it "
-        "follows the tool. result: the last answer of inverse kinematics. contacts: what the arm touches. "
+        description="q: the configuration on show. gripper: how far the gripper is open, from 0 (closed) to 1 "
+        "(open), null for an arm without one that opens. target: the pose that the arm is asked for, null while "
+        "it follows the tool. result: the last answer of inverse kinematics. contacts: what the arm touches. "
         "program: the program of the tab Program, and where it is.",
     )
     rate: float = Field(
@@ -135,6 +136,9 @@ class LiveMessage(Body):
     )
     q: Configuration | None = Field(
         None, description="The configuration, in radians (metres for sliding joints), within the limits."
+    )
+    gripper: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] | None = Field(
+        None, description="How far the gripper is open, a part of its range: 0 is closed, 1 open."
     )
     target: Target | None = Field(
         None,
@@ -218,6 +222,8 @@ def read(text: str, robot: Robot, store: Store) -> Message:
         values["program"] = _program(body.program, robot)
     if body.q is not None:
         values["q"] = configuration(robot, body.q, "q", within=True)
+    if body.gripper is not None:
+        values["gripper"] = body.gripper
     if body.target is not None:
         values["target"] = _target(body.target)
     if body.play is not None:

@@ -22,10 +22,11 @@ from app.live.client.drawing import Drawing
 from app.live.recording import Bounds, Recording, read, save
 from kin import InputError, KinematicsError, Obstacle, Robot
 from kin.motion import Motion, Program
+from kin.motion.program import checked_opening
 from kin.motors.joints import moving_motors, of_moving
 from kin.transforms import Array, pose_from_position_wxyz
 
-VALUES: Final = ("q", "target", "result", "contacts", "program")
+VALUES: Final = ("q", "gripper", "target", "result", "contacts", "program")
 RATE: Final = 30.0  # news a second
 TIMEOUT: Final = 10.0  # s for an answer
 SLACK: Final = 1e-6  # rad or m beyond a limit
@@ -37,8 +38,8 @@ class Event:
     """Something that has happened in the page.
 
     Attributes:
-        kind: ``"q"``, ``"target"``, ``"result"``, ``"contacts"``, ``"program"``, ``"robot"``; ``"problem"`` for a
-            value that was refused later; ``"disconnected"`` and ``"connected"``.
+        kind: ``"q"``, ``"gripper"``, ``"target"``, ``"result"``, ``"contacts"``, ``"program"``, ``"robot"``;
+            ``"problem"`` for a value that was refused later; ``"disconnected"`` and ``"connected"``.
         value: as the property of that name has it; of a problem, the `RefusedError`.
     """
 
@@ -134,6 +135,26 @@ class Page:
                 self._values["q"] = robot.clip(q)
         if refused is not None:
             raise refused
+
+    @property
+    def gripper(self) -> float | None:
+        """How far the gripper is open, a part of its range: 0 is closed, 1 open. None: the arm has none.
+
+        It is what was assigned last, or done in the page since. Assigning returns at once, as for `q`.
+        """
+        found = self._value("gripper")
+        return None if found is None else float(found)
+
+    @gripper.setter
+    def gripper(self, value: float) -> None:
+        opening = checked_opening("gripper", value)
+        if self.gripper is None:
+            raise InputError(
+                "gripper", value, f"an arm with a gripper that opens; the page shows {self._robot.name}"
+            )
+        with self._lock:
+            self._connection.stream(gripper=opening)
+            self._values["gripper"] = opening
 
     @property
     def measured(self) -> Array | None:
@@ -240,8 +261,9 @@ class Page:
     ) -> Iterator[Recording]:
         """Record what this program sends and hears meanwhile: ``with page.record("run.mcap") as recording: …``.
 
-        The recording has ``track()``: times, and the configurations that were commanded and measured. It ends by
-        itself when another arm is shown, or it has reached these bounds; ``recording.ended`` says why.
+        The recording has ``track()``: times, the configurations that were commanded and measured, and how far the
+        gripper was open. It ends by itself when another arm is shown, or it has reached these bounds;
+        ``recording.ended`` says why.
 
         Args:
             path: where it is written at the end, ``.mcap`` or ``.csv``; None: nowhere.
@@ -252,6 +274,8 @@ class Page:
         with self._lock:
             recording = Recording(self._robot, self._name, Bounds(seconds, int(megabytes * 1e6)))
             recording.add("/heard/q", {"q": self._values["q"].tolist()})
+            if (opening := self._values.get("gripper")) is not None:
+                recording.add("/heard/gripper", {"gripper": opening})
             self._recordings.append(recording)
         try:
             yield recording
@@ -275,10 +299,12 @@ class Page:
         if not 0.01 <= rate <= 100.0:
             raise InputError("rate", rate, "a number from 0.01 to 100")
         track, began = recording.track(), time.monotonic()
-        for t, q, measured in zip(track.t, track.commanded, track.measured, strict=True):
+        for t, q, measured, opening in zip(track.t, track.commanded, track.measured, track.opening, strict=True):
             time.sleep(max(0.0, began + t / rate - time.monotonic()))
             if not np.isnan(q).any():
                 self.q = self._robot.clip(q)
+            if not np.isnan(opening) and self.gripper is not None:
+                self.gripper = opening
             self.measured = None if np.isnan(measured).any() else measured
 
     def events(self) -> Iterator[Event]:

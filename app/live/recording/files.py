@@ -41,6 +41,7 @@ _TYPES: dict[str, dict[str, Any]] = {
     "q": _NUMBERS,
     "measured": {"anyOf": [_NUMBERS, {"type": "null"}]},
     "readings": {"anyOf": [_NUMBERS, {"type": "null"}]},
+    "gripper": {"type": ["number", "null"]},
     "drives": {"type": ["string", "null"]},
     "play": {"type": "boolean"},
     "clear": {"type": "boolean"},

@@ -1,8 +1,8 @@
 """A recording: every message with its time, and what the arm was commanded and measured to do in it.
 
 A recording belongs to one arm, and is bounded in time and in memory: it ends by itself, and says why. Its topics
-are ``/sent/…`` and ``/heard/…`` with the name of a field or the type of a message, and ``/page/q`` for the
-configurations that the page showed.
+are ``/sent/…`` and ``/heard/…`` with the name of a field or the type of a message, and ``/page/q`` and
+``/page/gripper`` for the configurations that the page showed, and how far the gripper was open there.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ from kin.parsing import Limits, TextError, read_json
 from kin.transforms import Array
 
 SHOWN: Final = "/page/q"
+OPENED: Final = "/page/gripper"
 MEASURED: Final = "/sent/measured"
-SPOKEN: Final = ("/sent/q", "/heard/q")  # what was commanded, where the page itself was not recorded
+# What was commanded, where the page itself was not recorded.
+SPOKEN: Final = {SHOWN: ("/sent/q", "/heard/q"), OPENED: ("/sent/gripper", "/heard/gripper")}
 READ: Final = "read from a file"  # why one has ended that was not made here
 ENTRY: Final = 120  # bytes of an entry beside its data
 LARGEST: Final = 1e6  # radians, metres
@@ -51,19 +53,29 @@ class Track:
     Attributes:
         t: times ``(k,)`` of changes, seconds.
         commanded, measured: configurations ``(k, n)``, radians (metres); NaN before the first one.
+        opening: how far the gripper was to be open ``(k,)``, 0 (closed) to 1 (open); NaN before the first one.
     """
 
     t: Array
     commanded: Array
     measured: Array
+    opening: Array
 
     def at(self, time: float) -> tuple[Array | None, Array | None]:
         """What was commanded and measured at a time ``(n,)``, or at the first one; None: nothing yet."""
         if not len(self.t):
             return None, None
-        row = max(int(np.searchsorted(self.t, time, side="right")) - 1, 0)
-        found = self.commanded[row], self.measured[row]
+        found = self.commanded[self._row(time)], self.measured[self._row(time)]
         return tuple(None if np.isnan(q).any() else q for q in found)  # type: ignore[return-value]
+
+    def opening_at(self, time: float) -> float | None:
+        """How far the gripper was to be open at a time, or at first; None: nothing says it."""
+        later = self.opening[self._row(time) :]
+        known = later[:1] if not np.isnan(later[:1]).any() else later[~np.isnan(later)]
+        return float(known[0]) if len(known) else None
+
+    def _row(self, time: float) -> int:
+        return max(int(np.searchsorted(self.t, time, side="right")) - 1, 0)
 
 
 @dataclass(frozen=True)
@@ -207,10 +219,11 @@ def too_large(most: int) -> InputError:
 
 
 def _track(entries: list[Entry], n: int) -> Track:
-    spoken = (SHOWN,) if any(each.topic == SHOWN for each in entries) else SPOKEN
-    wanted = [each for each in entries if each.topic in (*spoken, MEASURED)]
-    now = np.full((2, n), np.nan)  # commanded, measured
-    found = np.empty((len(wanted), 2, n))
+    topics = {each.topic for each in entries}
+    spoken = {topic for page, said in SPOKEN.items() for topic in ((page,) if page in topics else said)}
+    wanted = [each for each in entries if each.topic in spoken or each.topic == MEASURED]
+    now = {"q": np.full(n, np.nan), "measured": np.full(n, np.nan), "gripper": np.full(1, np.nan)}
+    found = np.empty((len(wanted), 2 * n + 1))
     for k, each in enumerate(wanted):
         field = each.topic.rpartition("/")[2]
         try:
@@ -219,9 +232,18 @@ def _track(entries: list[Entry], n: int) -> Track:
             if error.syntax:
                 raise
             raise InputError(f"recording, {each.topic}", error.value, error.expected) from None
-        now[int(field == "measured")] = np.nan if value is None or len(value) != n else _values(value, n)
-        found[k] = now
-    return Track(np.array([each.time for each in wanted]), found[:, 0], found[:, 1])
+        if field == "gripper":
+            now[field][:] = _opening(value)
+        else:
+            now[field][:] = np.nan if value is None or len(value) != n else _values(value, n)
+        found[k] = np.concatenate([*now.values()])
+    t = np.array([each.time for each in wanted])
+    return Track(t, found[:, :n], found[:, n : 2 * n], found[:, 2 * n])
+
+
+def _opening(given: object) -> float:
+    """How far a gripper is open; NaN where it is no number from 0 to 1."""
+    return float(given) if isinstance(given, int | float) and 0.0 <= given <= 1.0 else math.nan
 
 
 def _values(given: object, n: int) -> Array:

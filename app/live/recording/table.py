@@ -1,21 +1,25 @@
-"""Recordings as CSV: a row for each change of the commanded or the measured configuration, joint by joint."""
+"""Recordings as CSV: a row for each change of the commanded or the measured configuration, or of the gripper."""
 
 from __future__ import annotations
 
 import itertools
 import json
 import math
+from collections.abc import Mapping
 
-from app.live.recording.recording import MEASURED, SHOWN, Bounds, Entry, Recording
+import numpy as np
+
+from app.live.recording.recording import MEASURED, OPENED, SHOWN, Bounds, Entry, Recording
 from kin import InputError, Robot
 from kin.parsing import Limits, TextError, read_csv
 
 LONGEST_ROW = 16 * 1024  # characters: two numbers and names for each of 32 joints are a few thousand
 WAYS = {"commanded": SHOWN, "measured": MEASURED}
+GRIPPER = "gripper (0 to 1)"  # the last column, if anything is known of it
 
 
 def heads(robot: Robot) -> list[str]:
-    """The first row of the table of an arm."""
+    """The first row of the table of an arm, without the gripper."""
     units = ["rad" if turns else "m" for turns in robot.revolute]
     joints = [joint.name.replace(",", " ") for joint in robot.joints]
     return [
@@ -27,9 +31,12 @@ def heads(robot: Robot) -> list[str]:
 def to_csv(recording: Recording) -> str:
     """What was commanded and measured at each change, joint by joint; an empty cell: nothing yet."""
     track = recording.track()
-    lines = [",".join(heads(recording.robot))]
-    for t, q, measured in zip(track.t.tolist(), track.commanded.tolist(), track.measured.tolist(), strict=True):
-        cells = ["" if value != value else repr(value) for value in (*q, *measured)]
+    columns, names = [track.commanded, track.measured], heads(recording.robot)
+    if not np.isnan(track.opening).all():
+        columns, names = [*columns, track.opening[:, None]], [*names, GRIPPER]
+    lines = [",".join(names)]
+    for t, row in zip(track.t.tolist(), np.hstack(columns).tolist(), strict=True):
+        cells = ["" if value != value else repr(value) for value in row]
         lines.append(",".join([f"{t:.6f}", *cells]))
     return "\n".join(lines) + "\n"
 
@@ -43,33 +50,42 @@ def from_csv(data: bytes, robot: Robot, bounds: Bounds) -> Recording:
     rows = read_csv(data, Limits(bounds.size, LONGEST_ROW))
     try:
         _, first = next(rows, (0, []))
-        if first != heads(robot):
+        if first not in (heads(robot), [*heads(robot), GRIPPER]):
             raise _other_table(first, robot)
+        columns = {topic: slice(1 + k * robot.n, 1 + (k + 1) * robot.n) for k, topic in enumerate(WAYS.values())}
+        columns[OPENED] = slice(1 + 2 * robot.n, len(first))
         entries: list[Entry] = []
-        last, seen = 0.0, dict.fromkeys(WAYS, "")
+        last, seen = 0.0, dict.fromkeys(columns, "")
         for line, row in rows:
-            last = _take(row, line, robot.n, last, seen, entries)
+            last = _take(row, line, columns, last, seen, entries)
     except TextError as error:
         valid = "a recording of a connection (CSV)" if error.syntax else error.expected
         raise InputError("recording", error.value, valid) from None
     return Recording(robot, bounds=bounds).restored(entries, last)
 
 
-def _take(row: list[str], line: int, n: int, last: float, seen: dict[str, str], entries: list[Entry]) -> float:
-    """Add what has changed in a row since those before; returns its time."""
-    if len(row) != 1 + 2 * n:
-        raise InputError(f"recording, line {line}", f"{len(row)} cells", f"{1 + 2 * n} cells")
+def _take(
+    row: list[str],
+    line: int,
+    columns: Mapping[str, slice],
+    last: float,
+    seen: dict[str, str],
+    entries: list[Entry],
+) -> float:
+    """Add what has changed in a row since those before; returns its time. `columns`: of each topic."""
+    if len(row) != columns[OPENED].stop:
+        raise InputError(f"recording, line {line}", f"{len(row)} cells", f"{columns[OPENED].stop} cells")
     t = _number(row[0], line)
     if t < last:
         raise InputError(f"recording, line {line}", row[0], f"a time from {last:g} s on")
     before = len(entries)
-    for k, (what, topic) in enumerate(WAYS.items()):
-        cells = row[1 + k * n : 1 + (k + 1) * n]
-        values = [_number(cell, line) for cell in cells] if any(cells) else None
-        text = json.dumps({topic.rpartition("/")[2]: values})
-        if text != seen[what] and (values is not None or seen[what]):
+    for topic, place in columns.items():
+        values = [_number(cell, line) for cell in row[place]] if any(row[place]) else None
+        value = values[0] if values and topic == OPENED else values
+        text = json.dumps({topic.rpartition("/")[2]: value})
+        if text != seen[topic] and (values is not None or seen[topic]):
             entries.append(Entry(t, topic, text.encode()))
-            seen[what] = text
+            seen[topic] = text
     if len(entries) == before and entries:
         entries.append(Entry(t, entries[-1].topic, entries[-1].data))  # said once more
     return t

@@ -70,7 +70,9 @@ class SegmentTimesAnswer(Answer):
     end: float
     """Seconds from the start of the motion."""
     arrival: ArrivalAnswer | None
-    """In which configuration it meets its target; null for a pause."""
+    """In which configuration it meets its target; null where the arm stands still."""
+    opening: float | None
+    """How far the gripper is open at its end, 0 (closed) to 1 (open); null if it does not move the gripper."""
 
 
 class PeakAnswer(Answer):

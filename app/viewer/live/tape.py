@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.live import Line
 from app.live.recording import Bounds, Recording, Track, to_csv, to_mcap
-from app.live.recording.recording import SHOWN
+from app.live.recording.recording import OPENED, SHOWN
 from app.viewer.feature import Stage, save_file
 from app.viewer.panel.status import Notice
 from kin import InputError
@@ -62,6 +62,8 @@ class Tape:
             arm.robot, "" if program is None else program.name, Bounds(SECONDS, BYTES, OF_ALL)
         )
         self.recording.add(SHOWN, {"q": arm.q.tolist()})
+        if self._stage.arm.opening is not None:
+            self.recording.add(OPENED, {"gripper": self._stage.arm.opening})
         self._line, line.recording = line, self.recording
 
     def open(self, recording: Recording) -> None:
@@ -125,6 +127,9 @@ class Tape:
             self._track = self.recording.track()
         self.time = time
         q, measured = self._track.at(time)
+        opening = self._track.opening_at(time)
+        if opening is not None and self._stage.arm.opening is not None:
+            self._stage.arm.open_gripper(opening)
         if q is not None:
             q = self._stage.arm.now.robot.clip(q)
             self._stage.arm.move_to(q, Notice("hand", f"The recording at {time:.2f} s"), at_once=True)

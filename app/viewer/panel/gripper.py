@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import viser
 
-from app.viewer.panel import Post, listen
+from app.viewer.panel import Post, assign, listen
 from kin import InputError
 
 LAST = 1e6  # below the joints, whose sliders are renewed now and then
-HINT = "How far the fingers are open. No pose depends on it."
+HINT = "How far the gripper is open: 0 % closed, 100 % open. No pose depends on it; a connected program hears it."
 
 
 class GripperSlider:
@@ -20,15 +20,16 @@ class GripperSlider:
 
     def offer(self, share: float | None) -> None:
         """Show the slider for fingers that are open to a share; None: there are none."""
-        if (share is None) == (self._slider is None):
-            return
         if share is None:
-            assert self._slider is not None
-            self._slider.remove()
+            if self._slider is not None:
+                self._slider.remove()
             self._slider = None
             return
+        value = round(100.0 * share)
+        if self._slider is not None:
+            assign(self._slider, value)
+            return
         with self._folder:
-            value = round(100.0 * share)
             self._slider = self._gui.add_slider("Gripper (%)", 0, 100, 1, value, hint=HINT, order=LAST)
         listen(self._slider, self._post, "gripper")
 

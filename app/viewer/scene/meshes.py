@@ -20,10 +20,11 @@ from functools import lru_cache
 import numpy as np
 
 from app.viewer.scene.bodies.drawing import drawing
+from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
 from app.viewer.scene.chain import Chain, Link, chain, link_poses
 from app.viewer.scene.mounting import Mount, mount_of
-from app.viewer.scene.shapes import Solid, ball, box, cone, cylinder, merged, tube
+from app.viewer.scene.shapes import Solid, ball, box, cone, cylinder, merged, placed, tube
 from kin import Robot, link_frames
 from kin.transforms import Array
 
@@ -32,6 +33,7 @@ TRIM_COLOR: Color = (58, 64, 74)
 TOOL_COLOR: Color = (136, 144, 158)  # three times as light as a dark page, and as dark as a light one
 APPROACH_COLOR: Color = (214, 39, 120)
 MOST_AT_A_POINT = 4  # drums at one point, beyond which no further one is longer
+GRIPPERS = frozenset({"so100"})  # arms with a gripper whose tables state no motors
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,8 @@ class Body:
         chain: the links.
         parts: per link (base first), its meshes.
         gripper: the tool's meshes in the tool frame, z being the approach direction.
+        palm, fingers: the first of these in parts, of an arm whose gripper opens: the palm in the tool frame, the
+            fingers in that of the last link. Of others there are no fingers.
         mount: what holds the base, and the floor.
         center, radius: the sphere ``(3,)``, m that the camera should show.
         size: radius of the thickest link (m), the unit of all decoration.
@@ -51,6 +55,8 @@ class Body:
     chain: Chain
     parts: tuple[tuple[Part, ...], ...]
     gripper: tuple[Part, ...]
+    palm: Part
+    fingers: tuple[Finger, ...]
     mount: Mount
     center: Array
     radius: float
@@ -75,8 +81,20 @@ def body(robot: Robot) -> Body:
         parts.append(_link_parts(link, radii[link.index + 1], crowd, held, links))
     mount = mount_of(robot, size)
     center, radius = _view_sphere(robot, mount, size)
-    hand = _gripper(min(size, grip / 2), grip)
-    return Body(links, tuple(parts), hand, mount, center, radius, size, radii)
+    hand = _hand(min(size, grip / 2), grip)
+    whole = Part("gripper", merged([hand.palm, *hand.fingers]), TOOL_COLOR)
+    return Body(
+        chain=links,
+        parts=tuple(parts),
+        gripper=(whole, Part("approach", hand.approach, APPROACH_COLOR)),
+        palm=Part("gripper", hand.palm, TOOL_COLOR),
+        fingers=_fingers(hand, links) if _opens(robot) else (),
+        mount=mount,
+        center=center,
+        radius=radius,
+        size=size,
+        radii=radii,
+    )
 
 
 def _thickness(robot: Robot, links: Chain) -> float:
@@ -189,20 +207,47 @@ def rod(r: float, low: float, high: float, arrow: bool = True) -> Solid:
     return merged([rod, cone(0.38 * r, high - 0.2 * r, high + 0.8 * r)]) if arrow else rod
 
 
-def _gripper(size: float, grip: float) -> tuple[Part, ...]:
+@dataclass(frozen=True, eq=False)
+class _Hand:
+    """The meshes of the tool in its frame: the fingers are as far apart as they can be.
+
+    Attributes:
+        stroke: how far (m) each finger is from where it meets the other.
+    """
+
+    palm: Solid
+    fingers: tuple[Solid, Solid]
+    stroke: float
+    approach: Solid
+
+
+def _hand(size: float, grip: float) -> _Hand:
     w = 0.62 * size  # half the opening
     t = 0.2 * size
     palm = box((-w - 2 * t, -0.5 * size, -0.78 * grip), (w + 2 * t, 0.5 * size, -0.5 * grip))
     flange = cylinder(0.8 * size, -grip, -0.78 * grip)
-    fingers = [
+    right, left = (
         box((min(a, b), -0.34 * size, -0.5 * grip), (max(a, b), 0.34 * size, 0.0))
         for a, b in ((w, w + 1.4 * t), (-w, -w - 1.4 * t))
-    ]
-    arrow = merged([cylinder(0.11 * size, 0.0, 2.2 * size), cone(0.34 * size, 2.1 * size, 3.1 * size)])
-    return (
-        Part("gripper", merged([flange, palm, *fingers]), TOOL_COLOR),
-        Part("approach", merged([ball(0.2 * size), arrow]), APPROACH_COLOR),
     )
+    arrow = merged([cylinder(0.11 * size, 0.0, 2.2 * size), cone(0.34 * size, 2.1 * size, 3.1 * size)])
+    return _Hand(merged([flange, palm]), (right, left), w, merged([ball(0.2 * size), arrow]))
+
+
+def _opens(robot: Robot) -> bool:
+    """Whether the arm has a gripper: a motor that moves no joint."""
+    return robot.id in GRIPPERS or any(not motor.joint for motor in robot.motors)
+
+
+def _fingers(hand: _Hand, links: Chain) -> tuple[Finger, ...]:
+    """The fingers of the tool in the frame of the last link, which slide along the x axis of the tool."""
+    T, found = links.T_last_tool, []
+    for solid, side in zip(hand.fingers, (1.0, -1.0), strict=True):
+        axis = np.zeros((4, 4))
+        axis[2, 0], axis[1, 1], axis[0, 2], axis[3, 3] = -side, 1.0, side, 1.0  # its z is ±x of the tool
+        part = Part("finger", placed(solid, T), TOOL_COLOR)
+        found.append(Finger(len(links.links) - 1, (part,), T @ axis, True, -hand.stroke, 0.0))
+    return tuple(found)
 
 
 def _view_sphere(robot: Robot, mount: Mount, size: float) -> tuple[Array, float]:

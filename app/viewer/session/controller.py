@@ -309,6 +309,16 @@ class ArmController:
         if not self.dragging and (ring or self.snap or self._in_base):
             self.scene.place_gizmo(target)
 
+    @property
+    def opening(self) -> float | None:
+        """How far the gripper is open, from 0 (closed) to 1 (open); None: the arm has none that opens."""
+        return self.scene.opened
+
+    def open_gripper(self, opening: float) -> None:
+        """Open the gripper so far, as if its slider were moved there."""
+        self.scene.open_gripper(opening)
+        self._listener.on_gripper()
+
     def set_task(self, task: Task) -> None:
         """Change how much of the target pose the arm must match."""
         self.task = task

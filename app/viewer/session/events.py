@@ -69,7 +69,7 @@ RULES: Final[dict[str, Rule]] = {
     "view": Rule("View"),  # some of its controls say more
     "axes": Rule("Arrows along", message=True),
     "frame": Rule("Frame of the read-out", message=True),
-    "gripper": Rule(step=False),
+    "gripper": Rule(step=False, act=True),
     "text-size": Rule(step=False, message=True),
     "system-dark": Rule(step=False),
     "body": Rule(step=False),

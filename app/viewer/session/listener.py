@@ -22,6 +22,9 @@ class ArmListener(Protocol):
     def on_move(self, notice: Notice, at_once: bool) -> None:
         """The arm is heading for given joint values, `at_once` without easing; `notice` says why."""
 
+    def on_gripper(self) -> None:
+        """The gripper was opened or closed by something other than its slider."""
+
     def on_drag(self, start: Array, target: Array | None) -> None:
         """The visitor drags the target from one pose ``(4, 4)`` to another; None: it is released."""
 

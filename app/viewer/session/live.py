@@ -44,6 +44,7 @@ class LiveInput:
             "obstacles": self._use_obstacles,
             "program": self._use_program,
             "q": self._use_q,
+            "gripper": self._use_gripper,
             "target": self._use_target,
             "play": self._play,
         }
@@ -129,6 +130,12 @@ class LiveInput:
             raise InputError("q", np.asarray(q).tolist(), "a configuration within the limits of the arm on show")
         self._page.arm.move_to(robot.clip(q), Notice("hand", f"Joints moved by {self._name}"), at_once=True)
 
+    def _use_gripper(self, opening: float) -> None:
+        if self._page.arm.opening is None:
+            name = self._page.arm.robot.name
+            raise InputError("gripper", opening, f"an arm with a gripper that opens; the page shows {name}")
+        self._page.arm.open_gripper(opening)
+
     def _use_target(self, target: tuple[Array, bool]) -> None:
         T, oriented = target
         if not oriented:
@@ -158,6 +165,7 @@ class LiveInput:
         connect = next((each for each in page.features if isinstance(each, Connect)), None)
         values = {
             "q": page.arm.q,
+            "gripper": page.arm.opening,
             "target": page.arm.open_target,
             "result": None if page.activity.withheld else result,
             "contacts": () if connect is None else connect.contacts,

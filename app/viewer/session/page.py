@@ -222,6 +222,9 @@ class VisitorPage(Worker):
             self._actions.history.proceed()
             self._persistence.postpone(time.perf_counter())
 
+    def on_gripper(self) -> None:
+        self.panel.gripper.offer(self.arm.opening)
+
     def on_drag(self, start: Array, target: Array | None) -> None:
         self.numbers.use_drag(start, target)
 

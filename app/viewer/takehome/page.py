@@ -37,7 +37,7 @@ from app.viewer.views.templates import render
 from kin import IKOptions, InputError, Obstacle, Robot, __version__, solve_ik
 from kin.collision.solids import BOX, CYLINDER
 from kin.ik.problem import read_pose
-from kin.motion import Motion
+from kin.motion import Gripper, Motion
 from kin.named import robot_of
 from kin.robot import Joint
 from kin.solvers.contract import POSE
@@ -153,6 +153,8 @@ def _page(saved: SavedArm, drawn: Drawing | None, shared: bool) -> str:
         script=_text("page.js"),
         refusal=solver.refusal,
         ignored=_ignored(saved),
+        grips=saved.motion is not None
+        and any(isinstance(each, Gripper) for each in saved.motion.program.segments),
     )
 
 

@@ -18,7 +18,7 @@ from kin.motion.paths import NO_LENGTH, curve_of
 from kin.motion.planning.plan import Plan, RefusedError
 from kin.motion.planning.setting_off import set_off
 from kin.motion.planning.zones import drive_fastest
-from kin.motion.program import Circ, Dwell, Lin, PoseTarget, Program, Segment
+from kin.motion.program import Circ, Lin, Pause, PoseTarget, Program, Segment
 from kin.motion.results import InMotion, Motion, Refusal
 from kin.transforms import Array
 
@@ -73,7 +73,7 @@ def ended(program: Program, count: int) -> tuple[Segment, ...]:
     *most, last = program.segments[:count] or (None,)
     if last is None:
         return ()
-    return (*(each for each in most if each), last if isinstance(last, Dwell) else replace(last, blend=0.0))
+    return (*(each for each in most if each), last if isinstance(last, Pause) else replace(last, blend=0.0))
 
 
 def _drive_first(plan: Plan, whole: Program, count: int) -> None:

@@ -10,7 +10,7 @@ from kin.motion.arrivals import Arrival
 from kin.motion.details import ArrivesOtherwise, Cause, Help, Note, RefusalDetails
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import Piece
-from kin.motion.program import Move, Program, kind_of
+from kin.motion.program import Gripper, Move, Program, kind_of
 from kin.motion.results import InMotion, Motion, Refusal, SegmentTimes
 from kin.motion.tasks import most_kept
 from kin.robot import Robot
@@ -90,7 +90,8 @@ class Plan:
             segment = self.program.segments[first + k]
             times = self.time + start, self.time + end
             arrival = Arrival.of(self.robot, segment, q) if isinstance(segment, Move) else None
-            self.segments.append(SegmentTimes(first + k, kind_of(segment), segment.name, *times, arrival))
+            opening = segment.opening if isinstance(segment, Gripper) else None
+            self.segments.append(SegmentTimes(first + k, kind_of(segment), segment.name, *times, arrival, opening))
             if arrival is not None and not arrival.as_recorded:
                 self.notes.append(ArrivesOtherwise.of(first + k, arrival))
             start = end

@@ -38,7 +38,7 @@ from kin.motion.paths import (
     radius_of,
 )
 from kin.motion.planning.plan import Plan, RefusedError
-from kin.motion.program import Circ, Dwell, JointTarget, Lin, Ptp, Spline, Target
+from kin.motion.program import Circ, JointTarget, Lin, Pause, Ptp, Spline, Target
 from kin.motion.refusals import helps_at, helps_for, limit_met, lost, outside, violations
 from kin.motion.tasks import CODES
 from kin.transforms import Array
@@ -62,7 +62,7 @@ def _follows(plan: Plan, index: int, length: float) -> bool:
     following = plan.program.segments[index + 1 : index + 2]
     if not following:
         why = "last"
-    elif isinstance(following[0], Dwell):
+    elif isinstance(following[0], Pause):
         why = "dwell"
     elif length < NO_LENGTH:
         why = "short"

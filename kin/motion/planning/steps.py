@@ -7,7 +7,7 @@ from kin.motion.paths import Run, alone, is_joint_move, joined, limited, stoppin
 from kin.motion.pieces import Hold
 from kin.motion.planning.plan import Plan
 from kin.motion.planning.runs import check_limits, run_from
-from kin.motion.program import Dwell, Move, Ptp
+from kin.motion.program import Move, Pause, Ptp
 from kin.motion.refusals import slow_places
 from kin.motion.timing.timed import timed
 
@@ -17,7 +17,7 @@ _SAME_ZONE = 1e-6  # part of a zone that may be missing without a note
 def drive(plan: Plan, index: int) -> int:
     """Add the segment with this index to the plan, with those that it is blended into; the index after them."""
     segment = plan.program.segments[index]
-    if isinstance(segment, Dwell):
+    if isinstance(segment, Pause):
         plan.add(index, Hold(plan.q, segment.seconds), [segment.seconds], plan.q[None])
         return index + 1
     run, first = run_from(plan, index), index

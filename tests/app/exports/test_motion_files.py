@@ -125,3 +125,24 @@ def test_without_the_package_a_recording_is_refused_with_what_to_install(monkeyp
     monkeypatch.setitem(sys.modules, "mcap", None)
     with pytest.raises(kin.InputError, match="kinboard\\[mcap\\]"):
         written(motion_of(UR5), "mcap")
+
+
+def test_no_format_drops_the_gripper() -> None:
+    """Python plans it again; tables and messages say when it moves, and URScript where its command belongs."""
+    motion = kin.plan_motion("ur5", [kin.motion.Gripper(0.25, 1.0, "grip"), kin.motion.Ptp(UR5.q_home + 0.1)])
+    said = "0.25 from 0.0 s to 1.0 s"
+    for name in ("csv-commented", "trajectory-yaml", "trajectory-json"):
+        assert said in written(motion, name).decode()
+    (metadata,) = make_reader(io.BytesIO(written(motion, "mcap"))).iter_metadata()
+    assert said in metadata.metadata.values()
+    assert written(motion, "csv").decode().splitlines()[0].endswith(",gripper")
+    assert json.loads(written(motion, "ndjson").splitlines()[0])["segments"][0]["opening"] == 0.25
+    assert json.loads(written(motion, "json"))["segments"][1]["opening"] is None
+    assert (
+        "{'kind': 'gripper', 'opening': 0.25, 'seconds': 1.0, 'name': 'grip'}"
+        in written(motion, "python").decode()
+    )
+    script = written(motion, "urscript").decode()
+    assert "  # gripper 25 % open: the command of your gripper goes here\n  sleep(1)  # grip\n" in script
+    still = kin.plan_motion("ur5", [kin.motion.Ptp(UR5.q_home + 0.1)])
+    assert "gripper" not in "".join(written(still, name).decode() for name in ("csv-commented", "urscript"))

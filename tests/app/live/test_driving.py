@@ -90,6 +90,7 @@ class Page:
     connected = True
     drives: str | None = None
     readings: Any = None
+    gripper: float | None = 0.5
 
     def __init__(self, robot: kin.Robot) -> None:
         self.robot, self.q = robot, robot.q_home
@@ -508,6 +509,45 @@ def test_the_gripper_goes_to_its_goal_slowly_and_squeezes_no_harder(rig, capsys)
     rig.drive(CALIBRATIONS["full turn"], word="gripper 0")
     assert min(rig.goals(6)[len(goals) :]) == pytest.approx(here - session.SQUEEZE, abs=1.0)
     assert rig.goals(6)[-1] == pytest.approx(here, abs=1.0), "held where it is at the end"
+
+
+def test_the_gripper_follows_the_page_once_its_slider_was_moved(rig):
+    """What the page showed before is no command; the page takes over where the gripper is."""
+    low, high = RANGES[5]
+    shown: list[float | None] = []
+
+    def move(t: float) -> None:
+        step = round(t / session.CYCLE)
+        if step == 10:
+            shown.append(rig.page.gripper)
+            assert rig.goals(6) == [], "it has no goal yet"
+        if step == 20:
+            rig.page.gripper = 0.9
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"])
+    assert rig.said == ""
+    assert shown == [pytest.approx((START[5] - low) / (high - low), abs=1e-3)]
+    assert rig.line.servos[6].position == pytest.approx(low + 0.9 * (high - low), abs=1.0)
+    goals = [START[5], *rig.goals(6)]
+    assert np.abs(np.diff(goals)).max() <= 0.5 * (high - low) * session.CYCLE + 1.0
+    rig.clock.each = lambda _: None
+    rig.drive(CALIBRATIONS["full turn"])
+    assert rig.page.gripper == pytest.approx(0.9, abs=2e-3), "taken over again"
+    assert rig.goals(6)[-1] == goals[-1]
+
+
+def test_a_typed_opening_is_that_of_the_page(rig):
+    rig.typed.put("enable")
+    rig.drive(CALIBRATIONS["full turn"], word="gripper 40")
+    assert rig.page.gripper == 0.4
+    low, high = RANGES[5]
+    assert rig.line.servos[6].position == pytest.approx(low + 0.4 * (high - low), abs=1.0)
+    rig.page.gripper = None  # an arm that is drawn without a gripper
+    rig.typed.put("enable")
+    rig.drive(CALIBRATIONS["full turn"], word="gripper 60")
+    assert rig.page.gripper is None
+    assert rig.line.servos[6].position == pytest.approx(low + 0.6 * (high - low), abs=1.0)
 
 
 @pytest.mark.parametrize(

@@ -337,6 +337,7 @@ FAR = np.eye(4) + np.outer([0, 0, 1, 0], [0, 0, 0, 9.0])  # a pose out of reach
 PUBLISHED: dict[str, list[Any]] = {
     "robot": [kin.get_robot("scara"), replace(ARM, name="A “quoted” \u2028 name")],
     "q": [np.zeros(6), np.array([1e-17, -0.0, 1e16, np.pi, -1.2, 5.0])],
+    "gripper": [None, 0.5, 1.0],
     "target": [None, kin.fk(ARM, np.full(6, 0.5))],
     "result": [None, kin.solve_ik(ARM, kin.fk(ARM, np.full(6, 0.5))), kin.solve_ik(ARM, FAR)],
     "contacts": [

@@ -35,6 +35,7 @@ segments = (
         kin.motion.Spline, st.lists(poses, min_size=1, max_size=3) | st.lists(joints, min_size=1, max_size=3)
     )
     | st.builds(kin.motion.Dwell, st.floats(0, 5))
+    | st.builds(kin.motion.Gripper, st.floats(0, 1), st.floats(0, 5), st.text(max_size=10))
 )
 programs = st.builds(
     kin.motion.Program,
@@ -256,3 +257,75 @@ def test_a_motion_is_written_as_a_table(tmp_path):
     with pytest.raises(kin.InputError, match="rate"):
         motion.to_csv(tmp_path / "none.csv", rate=0)
     assert not (tmp_path / "none.csv").exists()
+
+
+def test_the_gripper_takes_its_time_and_the_arm_stands_still_meanwhile():
+    program = kin.motion.parse_program(
+        """
+        units = { length = "mm", angle = "deg" }
+        [[segments]]
+        kind = "ptp"
+        q = [10, -30, 40, 20, 0]
+        blend = 5
+        [[segments]]
+        kind = "gripper"
+        opening = 0.25
+        seconds = 0.5
+        [[segments]]
+        kind = "ptp"
+        q = [20, -30, 40, 20, 0]
+        [[segments]]
+        kind = "gripper"
+        opening = 1
+        name = "let go"
+        """,
+        kin.get_robot("so101"),
+    )
+    close, let_go = program.segments[1], program.segments[3]
+    assert close == kin.motion.Gripper(0.25, 0.5)
+    assert let_go == kin.motion.Gripper(1.0, name="let go")
+    motion = kin.plan_motion("so101", program)
+    assert motion.reason.startswith("2 motions and 2 gripper moves in")
+    assert "the arm pauses there" in motion.reason, "its zone is left out"
+    _, first, _, second = motion.segments
+    assert [each.opening for each in motion.segments] == [None, 0.25, None, 1.0]
+    assert first.end - first.start == pytest.approx(0.5)
+    assert second.end - second.start == pytest.approx(2.0)
+    q, qd, *_ = motion.derivatives(np.linspace(first.start, first.end, 9))
+    assert np.allclose(q, np.radians([10, -30, 40, 20, 0]))
+    assert np.abs(qd).max() == 0.0
+    times = [0.0, first.start + 0.2, first.end, second.start, second.start + 1.0, motion.duration, 1e3]
+    assert motion.opening(times).tolist() == pytest.approx(
+        [np.nan, 0.25, 0.25, 0.25, 0.625, 1.0, 1.0], nan_ok=True
+    )
+    assert motion.opening(first.start + 0.25, before=0.75) == pytest.approx(0.5)
+    assert motion.opening(0.0, before=0.75) == 0.75
+    at_once = kin.plan_motion("so101", [kin.motion.Gripper(0.0, 0.0)])
+    assert at_once.opening(0.0, before=1.0) == 0.0
+
+
+def test_a_table_of_samples_has_the_gripper_where_it_moves():
+    program = [kin.motion.Dwell(0.1), kin.motion.Gripper(0.5, 0.1), kin.motion.Gripper(1.0, 0.1)]
+    rows = "".join(kin.plan_motion("so101", program).csv_pieces(20.0)).splitlines()
+    assert rows[0].endswith(",tool_speed,gripper")
+    last = [row.rpartition(",")[2] for row in rows[1:]]
+    assert last[:2] == ["", ""]
+    assert [float(cell) for cell in last[2:]] == pytest.approx([0.5, 0.5, 0.5, 0.75, 1.0])
+    assert "gripper" not in "".join(kin.plan_motion("so101", [kin.motion.Dwell(0.1)]).csv_pieces())
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({}, r"segments\[0\]\.opening: got None, expected how far the gripper is open then"),
+        ({"opening": 40}, r"segments\[0\]\.opening: got 40, expected a number from 0 \(closed\) to 1 \(open\)"),
+        ({"opening": -0.1}, r"segments\[0\]\.opening"),
+        ({"opening": "open"}, r"segments\[0\]\.opening"),
+        ({"opening": True}, r"segments\[0\]\.opening"),
+        ({"opening": 1.0, "seconds": -1.0}, r"segments\[0\]\.seconds"),
+        ({"opening": 1.0, "speed": 0.5}, r"segments\[0\]\.speed: .* kind, opening, seconds, name"),
+    ],
+)
+def test_what_is_no_opening_is_refused(fields, message):
+    with pytest.raises(kin.InputError, match=message):
+        kin.motion.program_from_dict({"segments": [{"kind": "gripper", **fields}]})

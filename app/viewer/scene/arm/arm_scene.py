@@ -17,6 +17,7 @@ from app.viewer.scene.arm.frames import ArmFrames
 from app.viewer.scene.arm.joint_axes import axes
 from app.viewer.scene.arm.looks import AxesShown, Look
 from app.viewer.scene.bodies.drawing import Drawing, drawing
+from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.nodes import GHOST, DrawnBody, LinkColors
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import turn
@@ -72,6 +73,7 @@ class ArmScene:
         self._scene = scene
         self._joints: list[viser.SceneNodeHandle] = []
         self._bodies: list[viser.MeshHandle] = []
+        self._fingers: list[tuple[viser.MeshHandle, Finger]] = []  # of the skeleton's gripper
         self.colors = LinkColors()
         self._nodes: list[str] = []  # names of the nodes of the links, base first
         self._axes: list[viser.MeshHandle] = []
@@ -104,6 +106,7 @@ class ArmScene:
         self.gizmo_in_base = False
         self._R_gizmo_target = np.eye(3)
         self.use_drawing(drawn or drawing(robot))
+        self.open_gripper(self._drawn.opened)
         self.show(robot.q_home)
         self.place_gizmo(fk(robot, robot.q_home))
 
@@ -125,11 +128,14 @@ class ArmScene:
     def opened(self) -> float | None:
         """How far the gripper is open, from 0 to 1; None without fingers."""
         drawn = self._drawn.drawing
-        return self._drawn.opened if drawn is not None and drawn.fingers else None
+        opens = self._fingers or (drawn is not None and drawn.fingers)
+        return self._drawn.opened if opens else None
 
     def open_gripper(self, share: float) -> None:
         """Open the gripper to a share, from 0 (closed) to 1."""
         self._drawn.open(share)
+        for node, finger in self._fingers:
+            assign(node, *finger.place(share))
 
     def place_gizmo(self, T_base_tool: Array, again: bool = False) -> None:
         """Move the gizmo. Never call this while the visitor holds it. `again`: send its pose, changed or not."""
@@ -327,7 +333,10 @@ class ArmScene:
                 self._frames.add(name, row, T)
         tool = self.body.chain.T_last_tool
         gripper, approach = self.body.gripper
-        self._bodies.append(self._add(name, gripper, tool))
+        self._bodies.append(self._add(name, self.body.palm if self.body.fingers else gripper, tool))
+        for k, finger in enumerate(self.body.fingers):
+            self._bodies.append(self._add(name, finger.parts[0], name=f"finger-{k}"))
+            self._fingers.append((self._bodies[-1], finger))
         self._approach = self._add(name, approach, tool, visible=False)
 
     def _add(

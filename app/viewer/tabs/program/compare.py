@@ -11,8 +11,9 @@ import kin
 from app.viewer.profiles import Profile, fastest
 from app.viewer.tabs.program.plan import Plan, looped, start
 from app.viewer.tabs.program.program import as_kind
-from kin.motion import Dwell, Motion, Program, Ptp
+from kin.motion import Motion, Program, Ptp
 from kin.motion.pieces import Piece, look_between
+from kin.motion.program import Pause
 from kin.transforms import Array
 
 Choice = Literal["ptp", "lin", "zone", "cubic", "quintic", "trapezoidal", "s_curve", "fastest"]
@@ -74,7 +75,7 @@ def other_motion(program: Program, plan: Plan, loop: bool, choice: Choice, zone:
                 kind: Literal["ptp", "lin"] = "ptp" if choice == "ptp" else "lin"
                 segments, _ = as_kind(segments, index, kind, plan.q[index], plan.q[before][-1], robot)
     elif choice == "zone":
-        segments = tuple(each if isinstance(each, Dwell) else replace(each, blend=zone) for each in segments)
+        segments = tuple(each if isinstance(each, Pause) else replace(each, blend=zone) for each in segments)
     program = replace(program, segments=segments, jerk_limited=program.jerk_limited and choice != "fastest")
     motion = kin.plan_motion(robot, looped(program) if loop else program, start(program))
     return motion if choice not in _PROFILES or not motion.planned else with_profile(motion, _PROFILES[choice])
@@ -91,7 +92,7 @@ def with_profile(motion: Motion, kind: str) -> Motion:
             and abs(motion.starts[k] - times.start) < _SAME
             and abs(motion.starts[k + 1] - times.end) < _SAME
         )
-        if whole and not isinstance(segment, Dwell):
+        if whole and not isinstance(segment, Pause):
             start, end = motion.derivatives(np.array([times.start, times.end]))[0]
             scales = np.array([segment.speed, segment.acceleration, segment.acceleration])
             way = np.abs(end - start)
@@ -131,7 +132,7 @@ def jerk_is_infinite(motion: Motion) -> bool:
 def about(choice: Choice, motion: Motion) -> str:
     """What the choice means for a program."""
     words = _ABOUT.get(choice, "")
-    others = [each for each in motion.program.segments if not isinstance(each, Ptp | Dwell)]
+    others = [each for each in motion.program.segments if not isinstance(each, Ptp | Pause)]
     if choice in _PROFILES and (others or any(getattr(each, "blend", 0.0) for each in motion.program.segments)):
         words += " The profile replaces that of each PTP without a zone; other moves stay as planned."
     return words

@@ -13,12 +13,12 @@ from app.viewer.arm import Arm
 from app.viewer.tabs.program.program import Point, Segments, configuration, point, start_of, targets
 from kin import Obstacle, Robot
 from kin.collision.contacts import surroundings
-from kin.motion import Circ, Dwell, JointTarget, Lin, Motion, PoseTarget, Program, Ptp, Spline, start_as_recorded
+from kin.motion import Circ, JointTarget, Lin, Motion, PoseTarget, Program, Ptp, Spline, start_as_recorded
 from kin.motion.arrivals import Arrival
 from kin.motion.details import ArrivesOtherwise, Collides
 from kin.motion.messages import note
 from kin.motion.planning.collisions import checked
-from kin.motion.program import kind_of
+from kin.motion.program import Pause, kind_of
 from kin.motion.results import Refusal
 from kin.transforms import Array
 from kin.units import Units, typeset
@@ -69,7 +69,7 @@ class Plan:
     def before(self, index: int) -> int | None:
         """Index of the move before a row; None: there is none."""
         return max(
-            (i for i, each in enumerate(self.segments[:index]) if not isinstance(each, Dwell)), default=None
+            (i for i, each in enumerate(self.segments[:index]) if not isinstance(each, Pause)), default=None
         )
 
     @cached_property
@@ -108,7 +108,7 @@ class Plan:
         return configuration(target, self.motion.robot, seed)
 
     def arrival(self, index: int) -> Arrival | None:
-        """In which configuration the arm arrives at the end of a row; None: it does not, or the row is a pause."""
+        """In which configuration the arm arrives at the end of a row; None: it does not, or stands still there."""
         return self.driven.segments[index].arrival if self.driven is not None and index < len(self.ends) else None
 
     def arrives_otherwise(self, index: int) -> Arrival | None:

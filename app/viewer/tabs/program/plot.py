@@ -15,7 +15,8 @@ from app.exports.curves import LEFT, RIGHT, WIDTH, Curve, Row, drawn
 from app.exports.svg import joint_colour
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.motion import Dwell, Motion
+from kin.motion import Motion
+from kin.motion.program import Pause
 from kin.transforms import Array
 from kin.units import Units
 
@@ -90,7 +91,7 @@ def _rows(motion: Motion, joint: int | None, units: Units, curves: list[Curve]) 
     limits = tuple(
         (times.start, times.end, segment.tool_speed * scale)
         for times, segment in zip(motion.segments, motion.program.segments, strict=True)
-        if not isinstance(segment, Dwell) and segment.tool_speed is not None
+        if not isinstance(segment, Pause) and segment.tool_speed is not None
     )
     top = max(float(row.max()) for curve in curves if (row := curve.rows[-1]) is not None)
     shows = (0.0, 1e-6 * scale, *(limit for *_, limit in limits if limit < 4.0 * top))

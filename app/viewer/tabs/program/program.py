@@ -15,9 +15,11 @@ import numpy as np
 import kin
 from app.viewer.own_arm import clean
 from kin import InputError, Robot
+from kin.ik.messages.values import listed
 from kin.motion import (
     Circ,
     Dwell,
+    Gripper,
     JointTarget,
     Lin,
     PoseTarget,
@@ -27,12 +29,12 @@ from kin.motion import (
     program_from_dict,
     program_to_dict,
 )
-from kin.motion.program import Kind, Move, Segment, Target, field_names
+from kin.motion.program import Kind, Move, Pause, Segment, Target, field_names
 from kin.transforms import Array
 
 Segments = tuple[Segment, ...]
 Point = tuple[float, float, float]
-MOST = 40  # waypoints, points of splines and pauses; a link holds some 8000 bytes of all programs
+MOST = 40  # waypoints, points of splines and other rows; a link holds some 8000 bytes of all programs
 NAME = 40  # characters
 DIGITS = 7  # of a recorded joint value
 PAUSE = 1.0  # s, of a new pause
@@ -58,28 +60,31 @@ def posed(q: Array, robot: Robot) -> PoseTarget:
 
 
 def targets(segment: Segment) -> tuple[Target, ...]:
-    """The points of a spline, or the one target; none of a pause."""
-    if isinstance(segment, Dwell):
+    """The points of a spline, or the one target; none where the arm stands still."""
+    if isinstance(segment, Pause):
         return ()
     return segment.points if isinstance(segment, Spline) else (segment.target,)
 
 
 def places(segments: Segments) -> int:
-    """How many waypoints, points of splines and pauses there are."""
+    """How many waypoints, points of splines and other rows there are."""
     return sum(max(1, len(targets(each))) for each in segments)
 
 
 def counted(segments: Segments) -> str:
     """The same as a sentence."""
-    pauses = sum(isinstance(each, Dwell) for each in segments)
-    count = places(segments) - pauses
-    words = f"{count} waypoint{'s' * (count != 1)}"
-    return f"{words} and {pauses} pause{'s' * (pauses != 1)}." if pauses else f"{words}."
+    still = [type(each) for each in segments if isinstance(each, Pause)]
+    counts = (
+        (places(segments) - len(still), "waypoint"),
+        (still.count(Dwell), "pause"),
+        (still.count(Gripper), "gripper row"),
+    )
+    return listed([f"{count} {what}{'s' * (count != 1)}" for count, what in counts if count]) + "."
 
 
 def start_of(segments: Segments) -> int | None:
     """Index of the first move; None: there is none."""
-    return next((i for i, each in enumerate(segments) if not isinstance(each, Dwell)), None)
+    return next((i for i, each in enumerate(segments) if not isinstance(each, Pause)), None)
 
 
 def fits(segments: Segments, robot: Robot) -> bool:
@@ -119,8 +124,8 @@ def begun(segments: Segments, robot: Robot, q: Array) -> Segments:
 
 
 def with_target(segment: Segment, index: int, q: JointTarget, robot: Robot) -> Segment:
-    """A move to another configuration, or a spline with another point at `index`; a pause as it is."""
-    if isinstance(segment, Dwell):
+    """A move to another configuration, or a spline with another point at `index`; what stands still as it is."""
+    if isinstance(segment, Pause):
         return segment
     if not isinstance(segment, Spline):
         return replace(segment, target=q)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -41,6 +42,7 @@ class ProgramSettings(Settings):
         time: seconds since the beginning of the motion.
         sent: the configuration ``(n,)`` to which the arm was moved last while the program plays.
         leads: whether the arm is on its way to where playing begins.
+        opened: how far the gripper was open before the program moved it, 0 to 1; NaN: not known.
     """
 
     loop: bool = flag("Loop")
@@ -70,6 +72,7 @@ class ProgramSettings(Settings):
     playing: bool = memory(False)
     sent: Array | None = memory()
     leads: bool = memory(False)
+    opened: float = memory(math.nan)
 
 
 class Planned:

@@ -28,7 +28,7 @@ from app.viewer.feature import save_file, sent_text
 from app.viewer.own_arm import KEY
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere, round_points
-from app.viewer.tabs.program import postures, scene, views, ways
+from app.viewer.tabs.program import grip, postures, scene, views, ways
 from app.viewer.tabs.program import program as rows
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.plot import plot_html
@@ -38,8 +38,8 @@ from app.viewer.tabs.program.typed import Fields
 from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
-from kin.motion import Circ, Dwell, Program, Ptp, Spline, parse_program
-from kin.motion.program import Kind, Segment, Target
+from kin.motion import Circ, Dwell, Gripper, Program, Ptp, Spline, parse_program
+from kin.motion.program import Kind, Pause, Segment, Target
 from kin.path import PathPostures
 from kin.transforms import Array
 from kin.typed import EntryError
@@ -60,7 +60,8 @@ ROWS = {
     "shift-point": "Move a point", "delete-point": "Delete a point",
 }  # fmt: skip
 ACTS = {
-    "record": "Record a pose", "pause": "Add a pause", "clear": "Clear the program", "play": "",
+    "record": "Record a pose", "pause": "Add a pause", "gripper": "Add the gripper",
+    "clear": "Clear the program", "play": "",
     "scrub": "Time of the program", "joint": "", "zone": "", "download": "", "save": "", "page": "",
     "upload": "Open a program", "close-postures": "", "search": "", "way-seconds": "", "way-seed": "",
     "close-way": "", **dict.fromkeys(CHOICES, ""), "loop": "Loop",
@@ -89,12 +90,13 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
     def panel(self) -> Sequence[Node]:
         f, s, units = self.read, self.settings, self.stage.display.units
         opened, drawn = (f.chosen, f.point), (s.path, s.ghosts, s.frames)
+        grips = self.stage.arm.opening is not None
         form = [self.spec(name).cell(f"way-{name}", getattr(s, name), units) for name in ("seconds", "seed")]
         found = f.work("way") if s.search else None
         return [
             Html(views.player, (f.plan, f.playable, s.rate, s.loop, drawn, units)),
             Html(views.clock, (f.plan, f.time, s.playing)),
-            Html(views.list_html, (f.plan, opened, f.fault, s.loop, self._fields, s.by_pose, s.revision)),
+            Html(views.list_html, (f.plan, opened, f.fault, s.loop, self._fields, s.by_pose, s.revision, grips)),
             Html(postures.html, (f.chart, f.work("postures").value, units)),
             Html(ways.html, (f.way, found, s.seconds, form, units)),
             Html(plot_html, (f.motion, s.joint, units, f.other)),
@@ -226,9 +228,12 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         match name:
             case "record":
                 self._insert(len(f.segments), Ptp(recorded(here)), chosen=None)
-            case "pause":  # behind the open row, else at the end
-                at = len(f.segments) if f.chosen is None else f.chosen + 1
-                self._insert(at, Dwell(PAUSE), at)
+            case "pause":
+                self._add(Dwell(PAUSE))
+            case "gripper" if (opening := self.stage.arm.opening) is not None:
+                self._add(Gripper(round(opening, 2)))
+            case "gripper":
+                self._refuse("This arm has no gripper that opens", "Tab Robot: a motor without a joint is one.")
             case "clear":
                 self._use(())
             case "play" if s.playing:
@@ -270,6 +275,9 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
                 self._type(index, value)
             case "go":
                 self._go_to_row(index)
+            case "set" if isinstance(row, Gripper):
+                if (opening := self.stage.arm.opening) is not None:
+                    self._put(index, replace(row, opening=round(opening, 2)))
             case "set":
                 self._open(index)
                 self._set_target(index, self.stage.arm.now.goal, min(self.settings.point, len(targets(row)) - 1))
@@ -370,10 +378,16 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         found = self.facts.segments
         self._use((*found[:index], row, *found[index:]), chosen)
 
+    def _add(self, row: Dwell | Gripper) -> None:
+        """Insert a row behind the open one, else at the end, and open it."""
+        segments, chosen = self.facts.segments, self.facts.chosen
+        at = len(segments) if chosen is None else chosen + 1
+        self._insert(at, row, at)
+
     def _set_target(self, index: int, q: Array, point: int = -1) -> None:
         """Give a row, or a point of a spline, these joint values ``(n,)``."""
         row = self.facts.segments[index]
-        if not isinstance(row, Dwell):
+        if not isinstance(row, Pause):
             self._put(index, rows.with_target(row, point, recorded(q), self.facts.robot))
 
     def _set_kind(self, index: int, kind: Kind, opens: bool = False) -> None:
@@ -516,7 +530,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         assert f.motion is not None
         assert f.plan is not None
         q = f.robot.clip(f.motion.derivatives(time)[0])
-        self.change(time=time, sent=q)
+        self.change(time=time, sent=q, opened=grip.show(self.stage.arm, f.motion, time, self.settings.opened))
         self.stage.arm.move_to(q, notice or views.playing(f.plan, f.plan.row_at(time)), at_once=not ease)
 
     def _scrub(self, time: object) -> None:
@@ -536,11 +550,12 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         time, q = f.plan.met(index, f.point if index == f.chosen else MOST)
         if time is not None:
             self._stop()
-            self.change(time=time)
+            self.change(time=time, opened=grip.show(self.stage.arm, f.motion, time, self.settings.opened))
         self.stage.arm.move_to(f.robot.clip(q), Notice("hand", views.title(index, f.segments[index])))
 
     def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
-        yield from ((ACTS[name], (name,), None) for name in ("record", "pause", "clear"))
+        grips = ["gripper"] * (self.stage.arm.opening is not None)
+        yield from ((ACTS[name], (name,), None) for name in ("record", "pause", *grips, "clear"))
         yield "Play or stop the program", ("play",), None
         yield "Save the program", ("download",), None
         yield from ((f"Save the motion as {title}", ("save",), name) for name, title in views.MOTIONS.items())

@@ -15,8 +15,8 @@ from kin import InputError, Robot
 from kin.axes import inverse
 from kin.files.numbers import index_of
 from kin.ik import Task
-from kin.motion import Circ, Dwell, JointTarget
-from kin.motion.program import LONGEST_DWELL, Segment, field_names
+from kin.motion import Circ, JointTarget
+from kin.motion.program import LONGEST_DWELL, Pause, Segment, field_names
 from kin.poses import PoseKind, read_pose, roll_pitch_yaw
 from kin.transforms import Array
 from kin.typed import EntryError
@@ -27,6 +27,12 @@ LEAST, FASTEST = 1e-7, 1000.0  # m/s or rad/s
 EXACT = 12  # digits of a typed joint value
 # By the fields of segments: a row has those of its class.
 NUMBERS = {
+    "opening": Number(
+        label="Opening",
+        limits=(0.0, 1.0),
+        measure="%",
+        hint="How far the gripper is open then: 0 % closed, 100 % open",
+    ),
     "seconds": Number(label="Wait", limits=(0.0, LONGEST_DWELL), measure="s"),
     "speed": Number(
         label="Speed", limits=(SLOWEST, 1.0), measure="%", hint="Part of the velocity limits of the joints"
@@ -128,8 +134,8 @@ class Fields(NamedTuple):
         if field in NUMBERS and field in field_names(type(row)):
             changed: Any = {field: NUMBERS[field].typed(text, self.units)}
             return replace(row, **changed)
-        if isinstance(row, Dwell):
-            raise InputError("field", field, "name or seconds")
+        if isinstance(row, Pause):
+            raise InputError("field", field, "one of " + ", ".join(field_names(type(row))))
         if field == "via" and isinstance(row, Circ):
             T, _ = read_pose("position", text, self.units, inverse(self.frame) @ kin.fk(self.robot, q[index]))
             return replace(row, via=point((self.frame @ T)[:3, 3]))

@@ -16,13 +16,13 @@ from app.viewer.tabs.program.settings import RATES
 from app.viewer.tabs.program.typed import NUMBERS, Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
-from kin.motion import Dwell, Motion, MotionLimits, Peak, Spline
+from kin.motion import Dwell, Gripper, Motion, MotionLimits, Peak, Spline
 from kin.motion.details import ArrivesOtherwise
 from kin.motion.messages import note
-from kin.motion.program import Kind, Segment, kind_of
+from kin.motion.program import Kind, Pause, Segment, kind_of
 from kin.motion.results import Quantity
 from kin.transforms import Array
-from kin.units import Units, fixed, typeset
+from kin.units import Units, fixed, general, typeset
 
 KINDS: dict[Kind, tuple[str, str]] = {
     "ptp": ("PTP – straight in the joints", "PTP"),
@@ -83,7 +83,13 @@ def playing(plan: Plan, here: int | None) -> Notice:
     if here is None or here >= len(plan.segments):
         return Notice("hand", "Playing", "" if here is None else "Back to the start")
     row = plan.segments[here]
-    words = f"Waits {row.seconds:g} s" if isinstance(row, Dwell) else f"To waypoint {here + 1}"
+    match row:
+        case Gripper():
+            words = f"Gripper to {_percent(row.opening)}"
+        case Dwell():
+            words = f"Waits {row.seconds:g} s"
+        case _:
+            words = f"To waypoint {here + 1}"
     return Notice("hand", "Playing", f"{words}: {row.name}" if row.name else words)
 
 
@@ -104,6 +110,7 @@ def list_html(
     fields: Fields,
     by_pose: bool,
     revision: int,
+    grips: bool,
 ) -> str:
     """The rows of a program.
 
@@ -111,6 +118,7 @@ def list_html(
         opened: index of the row that is open, and which of its points the fields are of.
         by_pose: whether its values are those of the tool, not of the joints.
         revision: another one replaces what was typed into the fields.
+        grips: whether the arm has a gripper that opens.
     """
     segments = () if plan is None else plan.segments
     chosen, back = opened[0], None
@@ -134,6 +142,7 @@ def list_html(
         revision=revision,
         fields=fields,
         by_pose=by_pose,
+        grips=grips,
         way=plan is not None and chosen is not None and plan.can_have_way(chosen),
         begins=None if begins is None else begins[0] + 1,
     )
@@ -147,6 +156,7 @@ def _row(plan: Plan, index: int, fault: Fault | None, fields: Fields) -> dict[st
         "words": _words(plan.segments, index, fields),
         "time": f"{plan.ends[index]:.2f} s" if index < len(plan.ends) else "",
         "kind": kind_of(segment),
+        "waits": isinstance(segment, Pause),
         "row": segment,
         "otherwise": _otherwise(plan, index, fields),
         "starts": index == start_of(plan.segments),
@@ -156,7 +166,7 @@ def _row(plan: Plan, index: int, fault: Fault | None, fields: Fields) -> dict[st
 
 def title(index: int, segment: Segment) -> str:
     """The name of a row, or what it is."""
-    usual = {Dwell: "Pause", Spline: "Spline"}
+    usual = {Dwell: "Pause", Gripper: "Gripper", Spline: "Spline"}
     return segment.name or usual.get(type(segment), f"Waypoint {index + 1}")
 
 
@@ -178,8 +188,9 @@ def _otherwise(plan: Plan, index: int, fields: Fields) -> dict[str, object] | No
 def _words(segments: Segments, index: int, fields: Fields) -> str:
     """How the arm comes to a row, in a few words."""
     row, lengths = segments[index], fields.units.lengths
-    if isinstance(row, Dwell):
-        return f"waits {row.seconds:g} s"
+    if isinstance(row, Pause):
+        to = f"to {_percent(row.opening)}, " if isinstance(row, Gripper) else ""
+        return f"{to}waits {row.seconds:g} s"
     if index == start_of(segments):
         return "start"
     words = KINDS[kind_of(row)][1]
@@ -192,6 +203,11 @@ def _words(segments: Segments, index: int, fields: Fields) -> str:
     if row.blend:
         words += f", zone {lengths.brief(row.blend, 6)}"
     return words
+
+
+def _percent(opening: float) -> str:
+    """How far a gripper is open."""
+    return f"{general(100.0 * opening, 3)} %"
 
 
 def summary(plan: Plan | None, own: bool, units: Units) -> str:

@@ -17,8 +17,8 @@ from app.viewer.declared.work import Result
 from app.viewer.tabs.program.plan import Asked
 from app.viewer.tabs.program.program import MOST, Segments, options, places, recorded
 from app.viewer.views.templates import render
-from kin.motion import Dwell, JointTarget, Ptp
-from kin.motion.program import Segment
+from kin.motion import JointTarget, Ptp
+from kin.motion.program import Pause, Segment
 from kin.units import Units
 from kin.way import find_way, way_program
 
@@ -98,7 +98,7 @@ def search(
 def with_way(segments: Segments, before: int, index: int, between: Sequence[Segment], end: Ptp) -> Segments:
     """The rows with waypoints put in before one, which is met by PTP; the arm stops at both ends of the way."""
     start = segments[before]
-    assert not isinstance(start, Dwell)
+    assert not isinstance(start, Pause)
     stop = replace(start, blend=0.0)
     return (*segments[:before], stop, *segments[before + 1 : index], *between, end, *segments[index + 1 :])
 

@@ -24,6 +24,8 @@ from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.chain import link_poses
+from app.viewer.scene.meshes import Body, body
+from app.viewer.scene.shapes import merged, placed
 from app.viewer.server import ViewerServer
 from kin.files.urdf.visuals import read_visuals
 from kin.transforms import pose_from_position_wxyz
@@ -222,3 +224,59 @@ def test_the_page_has_one_slider_for_the_gripper_of_an_arm_that_has_one(tab: Fak
 def test_a_value_that_the_slider_does_not_send_is_refused(value: object) -> None:
     with pytest.raises(kin.InputError, match="from 0 to 100"):
         share_of(value)
+
+
+def apart(made: Body) -> float:
+    """The distance between the fingers when they are open."""
+    left, right = sorted(
+        (made.chain.T_last_tool[:3, :3].T @ (finger.parts[0].mesh.vertices - made.chain.T_last_tool[:3, 3]).T)[
+            0
+        ].tolist()
+        for finger in made.fingers
+    )
+    return min(right) - max(left)
+
+
+@pytest.mark.parametrize("name", ["so100", "so101"])
+def test_an_arm_with_a_gripper_and_without_a_drawn_body_has_fingers_that_slide(
+    tab: FakeBrowser, name: str
+) -> None:
+    robot = kin.get_robot(name)
+    tab.choose(robot.name)
+    tab.wait(lambda: "Gripper (%)" in tab.sliders_in("Joints"))
+    made = body(robot)
+    tool, last = made.chain.T_last_tool, len(made.chain.links) - 1
+    assert {finger.link for finger in made.fingers} == {last}
+
+    def places() -> list[np.ndarray]:
+        names = sorted(each for each in tab.nodes if "/finger-" in each)
+        return [tool[:3, :3].T @ tab.poses[each]["position"] for each in names]
+
+    for percent in (0, 40, 100):
+        tab.set("Gripper (%)", percent)
+        way = 0.5 * apart(made) * (1.0 - percent / 100.0)
+        expected = [[-way, 0.0, 0.0], [way, 0.0, 0.0]]
+        tab.wait(lambda expected=expected: np.allclose(places(), expected, atol=1e-6))  # type: ignore[misc]
+
+
+def test_the_fingers_of_the_slider_are_those_of_the_ghost_when_they_are_open() -> None:
+    made = body(kin.get_robot("so101"))
+    parts = [
+        made.palm.mesh,
+        *(placed(f.parts[0].mesh, np.linalg.inv(made.chain.T_last_tool)) for f in made.fingers),
+    ]
+    whole = merged(parts)
+    assert whole.vertices == pytest.approx(made.gripper[0].mesh.vertices, abs=1e-6)
+    assert body(kin.get_robot("planar2r")).fingers == ()
+
+
+def test_the_fingers_keep_their_opening_when_the_arm_is_drawn_anew() -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        arm = ArmScene(server.scene, kin.get_robot("so101"), root="/so101")
+        assert arm.opened == 0.5
+        arm.open_gripper(0.75)
+        arm.use_drawing(None)
+        assert arm.opened == 0.75
+    finally:
+        server.stop()

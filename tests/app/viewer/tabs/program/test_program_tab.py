@@ -590,3 +590,43 @@ def test_the_command_of_a_service_with_a_token_sends_it() -> None:
     text = SNIPPETS["curl"](motion, False, Service("https://arms.example/", token=True))
     assert '-H "Authorization: Bearer $KINBOARD_TOKEN"' in text
     assert "Bearer" not in SNIPPETS["curl"](motion, False, Service())
+
+
+@pytest.mark.full
+def test_the_gripper_is_a_row_that_is_played_undone_and_kept_in_the_link(port: int) -> None:
+    so101 = STORE.get("so101")
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        press(tab, "gripper")
+        tab.wait(lambda: "This arm has no gripper that opens" in tab.html)
+        tab.choose(so101.name)
+        press(tab, "record")
+        tab.wait(lambda: titles(tab) == ["Waypoint 1"])
+        tab.set("Gripper (%)", 80)
+        press(tab, "gripper")
+        assert titles(tab) == ["Waypoint 1", "Gripper"]
+        assert "to 80 %, waits 2 s" in part(tab, "list")
+        assert inputs(tab)["opening"] == "80"
+        press(tab, "field", 1, value=["opening", "20"])
+        press(tab, "field", 1, value=["seconds", "0.3"])
+        assert "to 20 %, waits 0.3 s" in part(tab, "list")
+        press(tab, "field", 1, value=["opening", "101"])
+        tab.wait(lambda: "“101” is not valid. Valid: 0 to 100 %." in html.unescape(tab.html))
+        assert clock(tab)["duration"] == "0.300"
+        press(tab, "play")
+        tab.wait(lambda: tab.value("Gripper (%)") == 20)
+        tab.wait(lambda: clock(tab)["playing"] == "0")
+        press(tab, "scrub", value=0.15)
+        tab.wait(lambda: tab.value("Gripper (%)") == 50)
+        press(tab, "go", 1)
+        tab.wait(lambda: tab.value("Gripper (%)") == 20)
+        tab.set("Gripper (%)", 40)
+        press(tab, "set", 1)
+        assert "to 40 %, waits 0.3 s" in part(tab, "list")
+        tab.say("undo")
+        tab.wait(lambda: "to 20 %, waits 0.3 s" in part(tab, "list"))
+        tab.wait(lambda: bool(tab.kept) and len(programs(tab.kept[-1])["so101"]["segments"]) == 2)  # type: ignore[index]
+        link = tab.kept[-1]
+    with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
+        tab.wait(lambda: titles(tab) == ["Waypoint 1", "Gripper"])
+        tab.wait(lambda: "to 20 %, waits 0.3 s" in part(tab, "list"))
