@@ -28,7 +28,7 @@ from app.shared.answers.motion import motion_answer
 from kin import InputError, Robot, plan_motion
 from kin.motion import Motion, Program, SegmentTimes, parse_program, program_from_dict
 from kin.transforms import Array
-from kin.units import Unit
+from kin.units import Unit, general
 
 PER_SECOND = Unit("Hz", 1.0, 2)
 LEAST_RATE, MOST_RATE = 0.1, 10_000.0
@@ -152,7 +152,7 @@ def _write(path: str, motion: Motion, kind: MotionFormat, rate: float, quiet: bo
 
 def _name(times: SegmentTimes) -> str:
     """The name of a segment, and how far it opens the gripper."""
-    opening = "" if times.opening is None else f"to {clean(100.0 * times.opening, 1)} %"
+    opening = "" if times.opening is None else f"to {general(100.0 * times.opening, 3)} %"
     return " ".join(filter(None, (opening, times.name)))
 
 

@@ -1000,6 +1000,16 @@ def test_move_starts_at_a_given_place_and_writes_to_standard_output(capsys):
     assert "movej([0, -1.57079633, 1.57079633, 0, 1.57079633, 0])  # the start" in out
 
 
+def test_move_says_how_far_the_gripper_opens(capsys, tmp_path):
+    file = tmp_path / "grip.toml"
+    file.write_text('[[segments]]\nkind = "gripper"\nopening = 0.25\nname = "grip"\n', encoding="utf-8")
+    code, out, _ = run(capsys, "move", "so101", file)
+    assert code == 0
+    assert re.search(r"1 +gripper +to 25 % grip +0\.000 +2\.000", out)
+    code, out, _ = run(capsys, "move", "so101", file, "-o", "-", "--format", "csv", "--rate", 1)
+    assert out.splitlines()[-1].endswith(",0.25")
+
+
 def test_a_program_that_cannot_be_driven_is_exit_code_1_and_a_reason(capsys, tmp_path):
     file = tmp_path / "far.toml"
     file.write_text('[[segments]]\nkind = "ptp"\nq = [9, 0, 0, 0, 0, 0]\n', encoding="utf-8")

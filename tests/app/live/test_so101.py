@@ -379,6 +379,31 @@ def test_the_page_of_the_command_has_a_process_of_its_own(typed, monkeypatch, pa
 
 
 @pytest.mark.full
+def test_the_gripper_follows_slider_and_program(page, bus, run, typed, patient, capsys):
+    """The page takes over where it is; then the slider leads it, and a program that is played."""
+    low, high = RANGES[5]
+
+    def opening() -> float:
+        return (bus.servos[6].position - low) / (high - low)
+
+    typed.put("enable")
+    started = run("--speed", 60)
+    page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
+    page.wait(lambda: page.value("Gripper (%)") == round(100.0 * (TICKS[5] - low) / (high - low)))
+    assert not bus.servos[6].memory[TORQUE], "it is switched on when the slider is moved"
+    page.set("Gripper (%)", 80)
+    page.wait(lambda: opening() == pytest.approx(0.8, abs=0.005))
+    q = np.radians(measured(page)).tolist()
+    rows = f"[[segments]]\nkind = 'ptp'\nq = {q}\n[[segments]]\nkind = 'gripper'\nopening = 0.3\nseconds = 1\n"
+    for name, value in (("upload", ["grip.toml", rows]), ("play", None)):
+        number = page.say("feature", ["program", [name, 1], value])
+        page.wait(lambda number=number: page.script["reply"][0] >= number)
+    page.wait(lambda: opening() == pytest.approx(0.3, abs=0.005))
+    assert bus.refused == 0
+    started.end(page)
+
+
+@pytest.mark.full
 def test_the_simulated_arm_is_shown_and_driven(viewer, page, typed, patient, capsys):
     page.choose(ARM.name)
     typed.put("enable")

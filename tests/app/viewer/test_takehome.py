@@ -136,6 +136,14 @@ def test_a_program_is_sampled_from_start_to_end():
     assert np.allclose(q, motion.sample(data["times"]).q, atol=1e-12)
 
 
+def test_a_program_that_moves_the_gripper_says_that_the_page_does_not():
+    said = "The gripper does not move in this page"
+    moves = [kin.motion.Gripper(0.5, 0.2), Ptp(JointTarget(tuple(Q + 0.1)))]
+    for segments, says in ((moves, True), (moves[1:], False)):
+        motion = kin.plan_motion(UR5, segments, Q)
+        assert (said in web_page(SavedArm(UR5, Q, motion=motion))) is says
+
+
 def test_a_refused_program_is_said():
     motion = kin.plan_motion(UR5, Program(segments=(Ptp(JointTarget((9.0, 0.0, 0.0, 0.0, 0.0, 0.0))),)))
     assert motion.driven is None
