@@ -443,6 +443,21 @@ def test_every_place_named_in_the_table_exists():
             assert (ROOT / path).exists(), f"{what}: {path}"
 
 
+def test_every_idea_of_the_numerics_is_where_the_architecture_says():
+    text = PAGES["docs/architecture.md"]
+    rows = [" ".join(row) for row in table(text, "idea")] + [row[0] for row in table(text, "loop")]
+    assert len(rows) > 30
+    for row in rows:
+        quoted = re.findall(r"`([^`]+)`", row)
+        homes = [ROOT / each for each in quoted if each.startswith("kin/")]
+        assert homes, row
+        assert all(home.exists() for home in homes), row
+        files = [file for home in homes for file in ([home] if home.is_file() else home.glob("*.py"))]
+        defined = "\n".join(file.read_text(encoding="utf-8") for file in files)
+        for name in ".".join(each for each in quoted if not each.startswith("kin/")).split("."):
+            assert not name or re.search(rf"^\s*(?:def|class) {name}\b", defined, re.MULTILINE), f"{name}: {row}"
+
+
 def mapped_files() -> list[str]:
     """Folders of the map, put together from its indentation."""
     text = re.search(r"## Map\n.*?```\n(.*?)```", CONTRIBUTING, re.DOTALL).group(1)

@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.kernels.dense import cholesky, solve_positive
+from kin.kernels.dense import cholesky, gram, solve_positive
 from kin.kernels.jacobian import jacobian_into
-from kin.motion.geometry.tracking import approach, gram, to_tool
+from kin.motion.geometry.tracking import approach, to_tool
 from kin.transforms import Array
 
 _SINGULAR = 0.05  # weight of the logarithm of manipulability

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.kernels.dense import solve_positive
+from kin.kernels.dense import gram, solve_positive
 from kin.kernels.jacobian import jacobian_into
 from kin.transforms import Array
 
@@ -114,17 +114,6 @@ def _step(J: Array, e: Array, rows: int, damping: float, q: Array) -> bool:
     for i in range(n):
         q[i] += z[i]
     return True
-
-
-@jit
-def gram(J: Array, rows: int, damping: float, A: Array) -> None:
-    """A ← J Jᵀ + damping · I of the rows that count."""
-    for r in range(rows):
-        for c in range(rows):
-            total = damping if r == c else 0.0
-            for j in range(J.shape[1]):
-                total += J[r, j] * J[c, j]
-            A[r, c] = total
 
 
 @jit
