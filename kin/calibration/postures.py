@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kin.angles import wrapped
 from kin.calibration.chain import Mask
 from kin.calibration.fit import Touches
 from kin.calibration.fixtures import PLANE, Places, TouchFixture, Whole
@@ -212,7 +213,7 @@ def _onto(robot: Robot, q: Array, missing: Callable[[Array], Array]) -> Array:
         JJ = J @ J.transpose(0, 2, 1) + 1e-10 * np.eye(miss.shape[1])
         dq = np.einsum("kij,ki->kj", J, np.linalg.solve(JJ, miss[:, :, None])[:, :, 0])
         q = q + dq * np.minimum(1.0, 0.5 / np.maximum(np.abs(dq).max(axis=1, keepdims=True), 1e-12))
-    return np.where(robot.whole_turns, (q + math.pi) % (2.0 * math.pi) - math.pi, q)
+    return np.where(robot.whole_turns, wrapped(q), q)
 
 
 def _frame(up: Array, cone: float, rng: np.random.Generator) -> Array:

@@ -59,10 +59,9 @@ class Surroundings:
 
     def distances(self, q: Array) -> tuple[Array, NDArray[np.int64]]:
         """The least distance at configurations ``(k, n)``, and a number that says between what, for `contact`."""
-        body, out, which = self.bodies, np.empty(len(q)), np.empty(len(q), np.int64)
+        q, body, out, which = np.ascontiguousarray(q), self.bodies, np.empty(len(q)), np.empty(len(q), np.int64)
         least_clearances(
-            *(self.robot.model, body.rows, body.shape, self.pairs, self.solids, body.moving),
-            *(q.copy(), out, which),  # of an array that can be written: for others the kernel is compiled again
+            self.robot.model, body.rows, body.shape, self.pairs, self.solids, body.moving, q, out, which
         )
         return out, which
 

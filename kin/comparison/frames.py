@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kin.angles import wrapped
 from kin.axes import inverse
 from kin.comparison.matching import (
     FLIP,
@@ -322,10 +323,10 @@ def _clean(T: Array, tolerance: Tolerance) -> Array:
 def _clean_offsets(offsets: Array, S: Array, tolerance: Tolerance) -> Array:
     """Angles within ±π, and zero where they are rounding."""
     turns = np.linalg.norm(S[:3], axis=0) > 0.5
-    wrapped = np.where(turns, np.remainder(offsets + math.pi, 2.0 * math.pi) - math.pi, offsets)
-    wrapped = np.where(turns & (wrapped + math.pi <= tolerance.angle), math.pi, wrapped)
-    small = np.abs(wrapped) <= np.where(turns, tolerance.angle, tolerance.length)
-    return np.asarray(np.where(small, 0.0, wrapped))
+    near = np.where(turns, wrapped(offsets), offsets)
+    near = np.where(turns & (near + math.pi <= tolerance.angle), math.pi, near)
+    small = np.abs(near) <= np.where(turns, tolerance.angle, tolerance.length)
+    return np.asarray(np.where(small, 0.0, near))
 
 
 @lru_cache(maxsize=32)

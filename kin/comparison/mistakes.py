@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from kin.angles import wrapped
 from kin.comparison.tables import ALPHA, COLUMNS, THETA, A, D, Tables
 from kin.dh.tables import convert_dh
 from kin.robot import CONVENTIONS, KIND_CODES, Convention, Robot
@@ -195,7 +196,7 @@ def _signs(m: int) -> Iterator[Edit]:
 
 def _angles(m: int) -> Iterator[Edit]:
     def plus(angle: float) -> Callable[[Array], Array]:
-        return lambda values: np.remainder(values + angle + math.pi, 2.0 * math.pi) - math.pi
+        return lambda values: wrapped(values + angle)
 
     for i in range(m):
         for angle in (0.5 * math.pi, -0.5 * math.pi):

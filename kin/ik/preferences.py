@@ -219,7 +219,7 @@ def _rows_at(problem: IKProblem, values: Array, rows: NDArray[np.intp]) -> Array
     """One row ``(k, n)`` of the branches at each value ``(k,)`` of the only redundancy parameter."""
     assert problem.closed_form is not None  # whose branches these are
     if problem.code == POSE:
-        targets = np.repeat(problem.T[None], len(values), axis=0)  # writable: kernels are compiled for such arrays
+        targets = np.repeat(problem.T[None], len(values), axis=0)
         return problem.closed_form.rows_at(targets, values, problem.seed, rows)
     asked = values.tolist()
     found = {

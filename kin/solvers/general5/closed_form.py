@@ -171,9 +171,7 @@ class General5(ClosedForm):
             values = np.broadcast_to(values, len(T))
             for start in range(0, len(T), _CHUNK):
                 part = slice(start, start + _CHUNK)
-                wanted = values[
-                    part
-                ].copy()  # broadcast values are read-only, for which kernels would be compiled anew
+                wanted = np.ascontiguousarray(values[part])
                 found = self._completed(form, params, np.ascontiguousarray(T[part]), wanted, longer)
                 rows = self._rows(found)
                 q = np.take_along_axis(found[..., :n], np.maximum(rows, 0)[..., None], axis=1)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kin.angles import TURN, apart, wrapped
 from kin.axes import size
-from kin.fk import fk, jacobian
+from kin.fk import jacobian
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
@@ -108,13 +108,6 @@ class Rounded7(Rounded):
         move_rows(self.robot.model, self._params, T, self._setting, values, rows[:, None])
         return rows
 
-    def prepare(self, q: Array) -> None:
-        """Load or compile every kernel, at a configuration ``(7,)`` inside the limits."""
-        p = SolverInput(fk(self.robot, q), POSE, _FREE, True, q, self.robot.lower.copy(), self.robot.upper.copy())
-        self.solve(p)
-        self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
-        Motions(self.robot.model, p.T, self._set(p), self._widened(p), self._move).follow(np.array([q]))
-
     def _in_one_turn(self, problem: SolverInput) -> SolverInput:
         """The same with contiguous arrays, and the limits of the parameter's joint at most one turn apart."""
         j, p = self._joint, problem
@@ -122,8 +115,9 @@ class Rounded7(Rounded):
         if j >= 0 and upper[j] - lower[j] > TURN:
             lower, upper = lower.copy(), upper.copy()
             lower[j], upper[j] = turn_around(float(lower[j]), float(upper[j]), float(p.seed[j]))
-        T = np.array(p.T)  # writable: kernels are compiled for such arrays
-        return SolverInput(T, POSE, p.values, p.respect_limits, p.seed, lower, upper, p.seed_roll)
+        return SolverInput(
+            np.ascontiguousarray(p.T), POSE, p.values, p.respect_limits, p.seed, lower, upper, p.seed_roll
+        )
 
     def _set(self, p: SolverInput) -> Array:
         """The setting of a problem."""

@@ -68,7 +68,6 @@ class Evaluator:
         low = np.where(np.isfinite(self.lower), self.lower, -math.pi)
         high = np.where(np.isfinite(self.upper), self.upper, math.pi)
         self.region = Region(robot, tuple(zip(low.tolist(), high.tolist(), strict=True)))
-        self.home = robot.q_home.copy()  # kernels take writable arrays only
         self.turns = np.where(robot.whole_turns, TURN, 0.0)
         self.rolls = _rolls(robot)
         self.frames = np.stack([frame_from_approach(direction) for direction in spherical_design(directions)])
@@ -145,7 +144,7 @@ class Evaluator:
         assert self.form is not None  # the method is "closed form"
         values = (math.nan,) * len(self.redundancies)
         for i, j in open_.tolist():
-            problem = SolverInput(T[i, j], APPROACH, values, True, self.home, self.lower, self.upper)
+            problem = SolverInput(T[i, j], APPROACH, values, True, self.robot.q_home, self.lower, self.upper)
             q = self.form.solve(problem).q
             self._raise(T[i, j], np.ascontiguousarray(q), best[i, j : j + 1])
 

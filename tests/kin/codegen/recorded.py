@@ -165,7 +165,9 @@ def typed(robot: Robot) -> None:
     rows = tuple(replace(row, alpha=round(row.alpha, 4)) for row in robot.rows)
     form = closed_form_of(replace(robot, id=f"{robot.id}-typed", rows=rows))
     if isinstance(form, Rounded7):
-        form.prepare(robot.q_home.copy())
+        q, limits = robot.q_home, (robot.lower, robot.upper)
+        for value in (np.nan, 0.1):
+            form.solve(SolverInput(fk(robot, q), POSE, (value,), True, q, *limits))
 
 
 def singular(robot: Robot) -> None:
