@@ -223,19 +223,24 @@ def rows_of(params: Array, first: int) -> Entries:
 
 
 @inlined
-def in_base(k: Entries, S: Array, column: int, b: int) -> tuple[float, float, float]:
-    """A column of the pose of target b, turned by base⁻¹, whose first three rows are k."""
-    x, y, z = S[column, b], S[column + 4, b], S[column + 8, b]
+def turned_by(k: Entries, x: float, y: float, z: float) -> Vector:
+    """A vector, turned by a transform of which k are the first three rows."""
     return k[0] * x + k[1] * y + k[2] * z, k[4] * x + k[5] * y + k[6] * z, k[8] * x + k[9] * y + k[10] * z
 
 
 @inlined
-def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
-    """base⁻¹ · T · tool⁻¹ of target b, row after row; k and t are the first three rows of base⁻¹ and tool⁻¹."""
-    u0, u1, u2 = in_base(k, S, 0, b)
-    v0, v1, v2 = in_base(k, S, 1, b)
-    w0, w1, w2 = in_base(k, S, 2, b)
-    p0, p1, p2 = in_base(k, S, 3, b)
+def in_base(k: Entries, S: Array, column: int, b: int) -> Vector:
+    """A column of the pose of target b, turned by base⁻¹, whose first three rows are k."""
+    return turned_by(k, S[column, b], S[column + 4, b], S[column + 8, b])
+
+
+@inlined
+def product_of(k: Entries, T: Entries, t: Entries) -> Entries:
+    """k · T · t, row after row, of transforms as their first three rows."""
+    u0, u1, u2 = turned_by(k, T[0], T[4], T[8])
+    v0, v1, v2 = turned_by(k, T[1], T[5], T[9])
+    w0, w1, w2 = turned_by(k, T[2], T[6], T[10])
+    p0, p1, p2 = turned_by(k, T[3], T[7], T[11])
     return (
         u0 * t[0] + v0 * t[4] + w0 * t[8], u0 * t[1] + v0 * t[5] + w0 * t[9], u0 * t[2] + v0 * t[6] + w0 * t[10],
         u0 * t[3] + v0 * t[7] + w0 * t[11] + (p0 + k[3]),
@@ -244,6 +249,16 @@ def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
         u2 * t[0] + v2 * t[4] + w2 * t[8], u2 * t[1] + v2 * t[5] + w2 * t[9], u2 * t[2] + v2 * t[6] + w2 * t[10],
         u2 * t[3] + v2 * t[7] + w2 * t[11] + (p2 + k[11]),
     )  # fmt: skip
+
+
+@inlined
+def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
+    """base⁻¹ · T · tool⁻¹ of target b, row after row; k and t are the first three rows of base⁻¹ and tool⁻¹."""
+    T = (
+        S[0, b], S[1, b], S[2, b], S[3, b], S[4, b], S[5, b], S[6, b], S[7, b], S[8, b], S[9, b], S[10, b],
+        S[11, b],
+    )  # fmt: skip
+    return product_of(k, T, t)
 
 
 @inlined

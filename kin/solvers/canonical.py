@@ -25,6 +25,7 @@ import numpy as np
 from kin.angles import TURN
 from kin.axes import inverse, screw_z
 from kin.kernels.compile import jit
+from kin.solvers.blocks import Entries, product_of, rows_of
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED
 from kin.solvers.contract import SolverInput
 from kin.transforms import Array
@@ -63,37 +64,11 @@ def pose_params(base: Array, tool: Array) -> list[float]:
 
 
 @jit
-def canonical(
-    params: Array, T: Array
-) -> tuple[float, float, float, float, float, float, float, float, float, float, float, float]:
+def canonical(params: Array, T: Array) -> Entries:
     """base⁻¹ · T · tool⁻¹ as twelve numbers, row after row; params[0:24] as from `pose_params`."""
-    p = params
-    a0 = p[0] * T[0, 0] + p[1] * T[1, 0] + p[2] * T[2, 0]
-    a1 = p[0] * T[0, 1] + p[1] * T[1, 1] + p[2] * T[2, 1]
-    a2 = p[0] * T[0, 2] + p[1] * T[1, 2] + p[2] * T[2, 2]
-    a3 = p[0] * T[0, 3] + p[1] * T[1, 3] + p[2] * T[2, 3] + p[3]
-    b0 = p[4] * T[0, 0] + p[5] * T[1, 0] + p[6] * T[2, 0]
-    b1 = p[4] * T[0, 1] + p[5] * T[1, 1] + p[6] * T[2, 1]
-    b2 = p[4] * T[0, 2] + p[5] * T[1, 2] + p[6] * T[2, 2]
-    b3 = p[4] * T[0, 3] + p[5] * T[1, 3] + p[6] * T[2, 3] + p[7]
-    c0 = p[8] * T[0, 0] + p[9] * T[1, 0] + p[10] * T[2, 0]
-    c1 = p[8] * T[0, 1] + p[9] * T[1, 1] + p[10] * T[2, 1]
-    c2 = p[8] * T[0, 2] + p[9] * T[1, 2] + p[10] * T[2, 2]
-    c3 = p[8] * T[0, 3] + p[9] * T[1, 3] + p[10] * T[2, 3] + p[11]
-    return (
-        a0 * p[12] + a1 * p[16] + a2 * p[20],
-        a0 * p[13] + a1 * p[17] + a2 * p[21],
-        a0 * p[14] + a1 * p[18] + a2 * p[22],
-        a0 * p[15] + a1 * p[19] + a2 * p[23] + a3,
-        b0 * p[12] + b1 * p[16] + b2 * p[20],
-        b0 * p[13] + b1 * p[17] + b2 * p[21],
-        b0 * p[14] + b1 * p[18] + b2 * p[22],
-        b0 * p[15] + b1 * p[19] + b2 * p[23] + b3,
-        c0 * p[12] + c1 * p[16] + c2 * p[20],
-        c0 * p[13] + c1 * p[17] + c2 * p[21],
-        c0 * p[14] + c1 * p[18] + c2 * p[22],
-        c0 * p[15] + c1 * p[19] + c2 * p[23] + c3,
-    )
+    x, y, z = T[0], T[1], T[2]
+    entries = (x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], z[0], z[1], z[2], z[3])
+    return product_of(rows_of(params, BASE), entries, rows_of(params, TOOL))
 
 
 @jit
@@ -102,6 +77,17 @@ def canonical_pose(arm: Array, T: Array, M: Array) -> None:
     (
         M[0, 0], M[0, 1], M[0, 2], M[0, 3], M[1, 0], M[1, 1], M[1, 2], M[1, 3], M[2, 0], M[2, 1], M[2, 2], M[2, 3]
     ) = canonical(arm, T)  # fmt: skip
+
+
+@jit
+def inverse_into(T: Array, X: Array) -> None:
+    """The first three rows of X ← those of T⁻¹, of a pose T ``(4, 4)``."""
+    for r in range(3):
+        shift = 0.0
+        for k in range(3):
+            X[r, k] = T[k, r]
+            shift -= T[k, r] * T[k, 3]
+        X[r, 3] = shift
 
 
 @jit

@@ -197,7 +197,8 @@ class ClosedForm(ABC):
         exact_ranges: whether the intervals of that parameter are exact, so that those of width 0 are found too.
         off: the largest angle (radians) or share of the arm's size by which the formulas are those of another arm;
             if it is not 0.0, configurations may be missing.
-        quick: the tasks whose targets take some microseconds each: `solve_many` serves these.
+        tasks: which of POSE, APPROACH and POSITION have a closed form.
+        quick: those whose targets take some microseconds each: `solve_many` serves these.
     """
 
     robot: Robot
@@ -212,19 +213,20 @@ class ClosedForm(ABC):
     steady: bool = True
     exact_ranges: bool = True
     off: float = 0.0
+    tasks: tuple[int, ...] = (POSE,)
     quick: tuple[int, ...] = ()
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The names of the branches on `robot`, in which joint i counts `sense[i]` times as it does here."""
         return Names(self.branches, self.meanings)
 
-    @abstractmethod
     def handles(self, task: int) -> bool:
-        """Whether this task (POSE, APPROACH, POSITION) has a closed form."""
+        """Whether a task has a closed form."""
+        return task in self.tasks
 
-    @abstractmethod
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """What a task that it handles leaves free."""
+        """What a task that it handles leaves free; here nothing."""
+        return ()
 
     @abstractmethod
     def solve(self, problem: SolverInput) -> Candidates:

@@ -27,7 +27,7 @@ from kin.differential.task import natural_task, task_jacobian, usual_rank
 from kin.fk import jacobian
 from kin.robot import Joint, Robot
 from kin.solvers.common import UNBOUNDED
-from kin.solvers.contract import POSE, Candidates, ClosedForm, RedundancyParameter, SolverInput
+from kin.solvers.contract import POSE, Candidates, ClosedForm, SolverInput
 from kin.solvers.reduced import held
 from kin.solvers.reversed import kernels_by_solving
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -117,14 +117,6 @@ class Coupled(ClosedForm):
         self.meanings = tuple((name, _THETA.sub(r"the angle at axis \1", text)) for name, text in form.meanings)
         self.off = form.off
         self.kernels = kernels_by_solving(self, form.kernels.params)
-
-    def handles(self, task: int) -> bool:
-        """Poses only: less leaves the free arm freedom that the joints have not."""
-        return task == POSE
-
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """None."""
-        return ()
 
     def solve(self, problem: SolverInput) -> Candidates:
         """The configurations of the free arm that the joints can make."""

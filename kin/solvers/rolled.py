@@ -57,16 +57,13 @@ def solve_approach(form: ClosedForm, problem: SolverInput, sense: float) -> Cand
             problem, task=POSE, values=(value - sense * roll,), seed=seed, lower=lower, upper=upper, weight=0.0
         )
     )
-    there = ~np.isnan(found.q[:, 0])
-    rolls = sense * (value - found.values[:, 0])
-    found.q[there, 6] = value
-    spans = np.array([(i, low, high) for i in np.flatnonzero(there)], dtype=np.float64).reshape(-1, 3)
-    values = np.column_stack([wrapped(rolls), np.where(there, value, math.nan)])
+    last = free_last(problem, found.q)
+    values = np.column_stack([wrapped(sense * (value - found.values[:, 0])), found.q[:, 6]])
     further = found.further
     return replace(
         found,
         values=values,
-        arcs=(_rolls(found.arcs[0], value, sense), spans),
+        arcs=(_rolls(found.arcs[0], value, sense), last),
         further=None if further is None else lambda: _angles(further(), value, sense),
     )
 

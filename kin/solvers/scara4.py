@@ -41,7 +41,7 @@ from kin.solvers.contract import (
 )
 from kin.solvers.names import Names, left_or_right, names_of, stance_of
 from kin.solvers.planar import BASE, LINKS, TOOL, TOOL_X, TOOL_Y, TOOL_Z, held, planar_free, two_links
-from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
+from kin.solvers.singular import Singularity, by_angle, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -256,6 +256,7 @@ class Scara4(ClosedForm):
     """The closed form of a SCARA or planar arm."""
 
     name, title, quick = NAME, TITLE, (POSE,)
+    tasks = (POSE, APPROACH, POSITION)  # `kin.ik` judges the tilt that is left
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
@@ -272,10 +273,6 @@ class Scara4(ClosedForm):
         return names_of(
             (left_or_right(stance, "elbow", "the elbow", "the last axis").times(-1.0),), [(1.0,), (-1.0,)]
         )
-
-    def handles(self, task: int) -> bool:
-        """Points, with an orientation or an approach direction, whose remaining tilt :mod:`kin.ik` judges."""
-        return task in (POSE, APPROACH, POSITION)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """The tool's angle about the axes, for a point alone or for a direction along the axes."""
@@ -313,10 +310,8 @@ class Scara4(ClosedForm):
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The elbow: the determinant is a b s2."""
-        joint = self.geometry.order[1]
-        elbow = self._elbow(q)
-        off = off_line(elbow)
-        there = (JointValue(joint, float(q[joint] - self.geometry.sign[1] * off)),)
+        g, elbow = self.geometry, self._elbow(q)
+        off, joint = off_line(elbow), g.order[1]
         return those_within(
-            within, Singularity("elbow", elbow_at(elbow), "last axis along the arm", abs(off), "rad", there)
+            within, by_angle("elbow", elbow_at(elbow), "last axis along the arm", off, q, joint, g.sign[1])
         )

@@ -102,6 +102,14 @@ def by_jacobian(J: Array, rank: int) -> Singularity:
     return Singularity("jacobian", "smallest singular value", "slowest direction", least, "SI", shape=shape)
 
 
+def by_angle(
+    kind: Kind, condition: Condition, lost: Lost, off: float, q: Array, joint: int, sense: float = 1.0
+) -> Singularity:
+    """One that a single joint decides: its canonical angle, which grows with sense · q[joint], is off by `off`."""
+    there = JointValue(joint, float(q[joint] - sense * off))
+    return Singularity(kind, condition, lost, abs(off), "rad", (there,))
+
+
 def off_line(t: float) -> float:
     """Signed angle from the nearest multiple of π to t, in [−π/2, π/2]: zero where sin t is."""
     return math.remainder(t, math.pi)

@@ -23,7 +23,7 @@ from kin.robot import Robot
 from kin.solvers.blocks import Arc, Entries, kernels_in_lanes
 from kin.solvers.contract import Obstacle
 from kin.solvers.names import Names, Part, eight, front_or_back, names_of
-from kin.solvers.singular import JointValue, Singularity, off_line, those_within
+from kin.solvers.singular import Singularity, by_angle, off_line, those_within
 from kin.solvers.wrist6.batch import (
     BEND,
     FRONT,
@@ -171,17 +171,9 @@ class Slide6(Wrist6):
         x, wrist = self._x_of_wrist(t), off_line(t[4])
         if min(abs(t[2]), abs(x), abs(wrist)) > within:
             return ()  # as almost everywhere
-        aligned = float(q[4] - g.sign[4] * wrist)
         return those_within(
             within,
             Singularity("elbow", "wrist centre level with axis 2", "wrist centre off the slide", abs(t[2]), "m"),
             Singularity("shoulder", "wrist centre nearest to axis 1", "wrist centre sideways", abs(x), "m"),
-            Singularity(
-                "wrist",
-                "axes 4 and 6 in line",
-                "tilt about the third axis",
-                abs(wrist),
-                "rad",
-                (JointValue(4, aligned),),
-            ),
+            by_angle("wrist", "axes 4 and 6 in line", "tilt about the third axis", wrist, q, 4, g.sign[4]),
         )

@@ -8,7 +8,7 @@ from kin.kernels.compile import inlined, jit
 from kin.kernels.fk import all_finite_pose
 from kin.robot import Robot
 from kin.solvers.common import clear
-from kin.solvers.contract import ClosedForm, RedundancyParameter
+from kin.solvers.contract import ClosedForm
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -53,7 +53,3 @@ class SlidesForm(ClosedForm):
     branches = BRANCHES
     lengths = ()
     named = False
-
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """None."""
-        return ()

@@ -153,7 +153,8 @@ solve_many = each_solved(_regular, math.nan, 0)
 class Slides2(SlidesForm):
     """The closed form of an arm with one turning and two sliding joints."""
 
-    name, title, quick = NAME, TITLE, (POSE, APPROACH, POSITION)
+    name, title = NAME, TITLE
+    tasks = quick = (POSE, APPROACH, POSITION)  # of all three the point is met, and the caller judges the rest
     reason = "one of three joints turns and two slide"
 
     def __init__(self, robot: Robot) -> None:
@@ -161,10 +162,6 @@ class Slides2(SlidesForm):
         order = np.concatenate([np.flatnonzero(robot.revolute), np.flatnonzero(~robot.revolute)])
         params = np.concatenate([order, [_reach(robot)], robot.model]).astype(np.float64)
         self.kernels = BatchKernels(params, branches_one, branches_many, seeded=solve_many)
-
-    def handles(self, task: int) -> bool:
-        """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""
-        return task in (POSE, APPROACH, POSITION)
 
     def solve(self, problem: SolverInput) -> Candidates:
         """Both configurations."""

@@ -186,10 +186,6 @@ class Slides3(SlidesForm):
         params = np.concatenate([turns, slides, axes.ravel(), R.ravel(), robot.model]).astype(np.float64)
         self.kernels = BatchKernels(params, branches_one, branches_many, seeded=solve_many)
 
-    def handles(self, task: int) -> bool:
-        """Poses."""
-        return task == POSE
-
     def solve(self, problem: SolverInput) -> Candidates:
         """Both configurations."""
         q = np.empty((2, 6))

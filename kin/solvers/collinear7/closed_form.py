@@ -24,7 +24,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, eight, flipped, left_or_right, names_of, stance_of
-from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
+from kin.solvers.singular import Singularity, by_angle, elbow_at, off_line, off_perpendicular, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -58,6 +58,7 @@ class Collinear7(ClosedForm):
 
     def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
+        self.tasks = (POSE, APPROACH) if g.tool_on_axis else (POSE,)
         self.lengths = (g.d3, g.d5)
         self.kernels = BatchKernels(np.append(g.params, REACH), branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
@@ -72,10 +73,6 @@ class Collinear7(ClosedForm):
             flipped(5, sense[5], g.offset[5], "axes 5 and 7 are in line"),
         )
         return names_of((side, elbow, wrist), eight())
-
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction when it passes through the wrist centre."""
-        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """θ1, which joint 2 undoes; for an approach direction the roll about it as well."""
@@ -115,28 +112,15 @@ class Collinear7(ClosedForm):
         """
         g = self.geometry
         t = (q + g.offset).tolist()
-        off = (0.0, 0.0, off_perpendicular(t[2]), off_line(t[3]), 0.0, off_line(t[5]))
+        elbow, shoulder, wrist = off_line(t[3]), off_perpendicular(t[2]), off_line(t[5])
         across, along = g.d5 * math.sin(t[3]) * math.cos(t[2]), g.d3 + g.d5 * math.cos(t[3])
         off_axis = math.hypot(across, along)
-        if min(abs(off[2]), abs(off[3]), abs(off[5]), off_axis) > within:
+        if min(abs(elbow), abs(shoulder), abs(wrist), off_axis) > within:
             return ()  # as almost everywhere
-
-        def met_at(joint: int) -> tuple[JointValue]:
-            return (JointValue(joint, float(q[joint]) - off[joint]),)
-
         found = [
-            Singularity("elbow", elbow_at(t[3]), "hand along the arm", abs(off[3]), "rad", met_at(3)),
-            Singularity(
-                "shoulder",
-                "forearm in one plane with axis 1",
-                "hand along the forearm",
-                abs(off[2]),
-                "rad",
-                met_at(2),
-            ),
-            Singularity(
-                "wrist", "hand along the forearm", "joints 5 and 7 coincide", abs(off[5]), "rad", met_at(5)
-            ),
+            by_angle("elbow", elbow_at(t[3]), "hand along the arm", elbow, q, 3),
+            by_angle("shoulder", "forearm in one plane with axis 1", "hand along the forearm", shoulder, q, 2),
+            by_angle("wrist", "hand along the forearm", "joints 5 and 7 coincide", wrist, q, 5),
         ]
         if g.d5 >= g.d3 - TOLERANCES.geometry:
             # Only a forearm at least as long as the upper arm gets back to axis 1; then θ3 is ±90°, too.

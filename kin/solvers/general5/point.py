@@ -36,7 +36,6 @@ from kin.solvers.contract import (
     Candidates,
     ClosedForm,
     Obstacle,
-    RedundancyParameter,
     SolverInput,
 )
 from kin.solvers.numeric.descent import descend
@@ -278,6 +277,7 @@ class Point3(ClosedForm):
     branches = tuple(f"solution {i + 1}" for i in range(ROWS))
     lengths = ()
     named = steady = False
+    tasks = (POSE, APPROACH, POSITION)  # of all three the point is met, and the caller judges the rest
 
     def __init__(self, robot: Robot) -> None:
         self.robot, size = robot, extent(robot)
@@ -292,14 +292,6 @@ class Point3(ClosedForm):
         parts = [turns, lines.z, *lengths, np.array([size]), robot.model]
         params = np.concatenate([np.ravel(part) for part in parts])
         self.kernels = BatchKernels(params, branches_one, branches_many)
-
-    def handles(self, task: int) -> bool:
-        """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""
-        return task in (POSE, APPROACH, POSITION)
-
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """None."""
-        return ()
 
     def solve(self, problem: SolverInput) -> Candidates:
         """All configurations; beside singular ones nothing proves that none is missing."""

@@ -10,6 +10,7 @@ from kin.angles import TURN, wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
 from kin.solvers.blocks import one_after_another
+from kin.solvers.canonical import inverse_into
 from kin.solvers.common import clear
 from kin.solvers.general6.cuts import (
     AFTER,
@@ -49,12 +50,9 @@ def loop_of(params: Array, T: Array, F: Array) -> None:
             for k in range(4):
                 F[i, r, k] = p[LOOP + 12 * i + 4 * r + k]
     X, Y = np.empty((3, 4)), np.empty((3, 4))
+    inverse_into(T, X)
     for r in range(3):
-        shift = 0.0
-        for k in range(3):
-            X[r, k] = T[k, r]
-            shift -= T[k, r] * T[k, 3]
-        X[r, 3] = shift / p[SIZE_OF_ARM]
+        X[r, 3] /= p[SIZE_OF_ARM]
     _times(p[BEFORE : BEFORE + 12].reshape(3, 4), X, Y)
     _times(Y, p[AFTER : AFTER + 12].reshape(3, 4), F[int(p[PLACE]) % 6])
 

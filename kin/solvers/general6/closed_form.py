@@ -170,16 +170,12 @@ class General6(ClosedForm):
         proved: int,
     ) -> None:
         self.robot = robot
-        self.tool_on_axis = tool_on_axis
+        self.tasks = (POSE, APPROACH) if tool_on_axis else (POSE,)
         self.kernels = reading.kernels(kernels)
         self.reading, self.solver, self.proved = reading, solve, proved
         slides = int((~robot.revolute).sum())
         kind = ("revolute joints", "joints, one of which slides,", "joints, two of which slide,")[slides]
         self.reason = f"six {kind} whose axes fit no closed form: all real solutions by elimination"
-
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-        return task == POSE or (task == APPROACH and self.tool_on_axis)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """None for a pose, joint 6 for an approach direction."""

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from kin.angles import apart, wrapped
-from kin.axes import links_of
+from kin.axes import inverse, links_of
 from kin.robot import Robot
 from kin.solvers.contract import BatchKernels
 from kin.solvers.general6.batch import AGREED, NOT_FINITE, OPEN, loop_of
@@ -85,12 +85,6 @@ def _quantities(T: Array) -> Array:
     return np.concatenate([T[..., :3, :3].reshape(3, 3, 9), level[..., None]], axis=-1)
 
 
-def _inverse(T: Array) -> Array:
-    out = np.eye(4)
-    out[:3, :3], out[:3, 3] = T[:3, :3].T, -T[:3, :3].T @ T[:3, 3]
-    return out
-
-
 def _coefficients(values: Array) -> Array:
     """Coefficients ``(10, 3, 3)`` of (1, cos, sin) × (1, cos, sin) of quantities at three by three angles."""
     return np.asarray(np.einsum("ik,jl,klm->mij", _FOURIER, _FOURIER, values))
@@ -121,7 +115,7 @@ def solve_opposite(params: Array, T: Array, out: Array) -> int:
     F = _loop(params, T)
     left = _coefficients(_quantities(F[2] @ _TURNS[:, None] @ F[3] @ _TURNS[None] @ F[4]))
     right = _coefficients(
-        _quantities(_inverse(F[1]) @ _BACK[None] @ _inverse(F[0]) @ _BACK[:, None] @ _inverse(F[5]))
+        _quantities(inverse(F[1]) @ _BACK[None] @ inverse(F[0]) @ _BACK[:, None] @ inverse(F[5]))
     )
     # Combinations of the ten quantities in which a and b cancel, but for the constant monomial.
     Q = right.reshape(10, 9)
@@ -161,7 +155,7 @@ def _configuration(F: Array, left: Array, constant: Array, back: Array, d: float
     a, b = math.atan2(m[5], m[2]), math.atan2(m[1], m[0])
     t = np.array([a, b, 0.0, d, e, 0.0])
     L = F[2] @ _screw(d) @ F[3] @ _screw(e) @ F[4]
-    R = _inverse(F[1]) @ _screw(-b) @ _inverse(F[0]) @ _screw(-a) @ _inverse(F[5])
+    R = inverse(F[1]) @ _screw(-b) @ inverse(F[0]) @ _screw(-a) @ inverse(F[5])
     directions = np.column_stack([[0.0, 0.0, 1.0], L[:3, 2]])
     t[[2, 5]] = np.linalg.lstsq(directions, R[:3, 3] - L[:3, 3])[0]
     return t

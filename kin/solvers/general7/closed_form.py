@@ -189,11 +189,8 @@ class General7(ClosedForm):
         self.fold = Fold(robot, joint)
         self.kernels = self.fold.kernels(form.kernels)
         self._roll = rolled.roll_sense(robot)
+        self.tasks = (POSE, APPROACH) if self._roll != 0.0 else (POSE,)
         self._parameter = RedundancyParameter(f"theta{joint + 1}", f"θ{joint + 1}", joint=joint)
-
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction along the last joint's axis."""
-        return task == POSE or (task == APPROACH and self._roll != 0.0)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """The given joint; for an approach direction the roll or the last joint as well."""

@@ -17,7 +17,7 @@ from kin.angles import wrap
 from kin.kernels.compile import jit
 from kin.kernels.fk import all_finite_pose
 from kin.solvers.blocks import one_after_another
-from kin.solvers.canonical import canonical_pose
+from kin.solvers.canonical import canonical_pose, inverse_into
 from kin.solvers.common import UNBOUNDED, clear, zyz
 from kin.solvers.offset7.geometry import (
     A1,
@@ -56,20 +56,22 @@ def chain_values(params: Array, q: Array, t: Array) -> None:
 
 
 @jit
+def chain_pose(params: Array, T: Array, N: Array) -> None:
+    """The first three rows of N ← the canonical pose of the chain, which is reversed for T⁻¹; T ``(4, 4)``."""
+    if params[REVERSED] > 0.0:
+        X = np.empty((3, 4))
+        inverse_into(T, X)
+        canonical_pose(params, X, N)
+    else:
+        canonical_pose(params, T, N)
+
+
+@jit
 def seen(params: Array, T: Array, t1: float, M: Array) -> None:
     """M ``(3, 4)`` ← the wrist of the target T ``(4, 4)`` as seen from O, z along axis 2, with joint 1 at t1."""
     p = params
-    X, N = np.empty((4, 4)), np.empty((4, 4))
-    if p[REVERSED] > 0.0:
-        for r in range(3):
-            shift = 0.0
-            for k in range(3):
-                X[r, k] = T[k, r]
-                shift -= T[k, r] * T[k, 3]
-            X[r, 3] = shift
-        canonical_pose(p, X, N)
-    else:
-        canonical_pose(p, T, N)
+    N = np.empty((3, 4))
+    chain_pose(p, T, N)
     c, s = math.cos(t1), math.sin(t1)
     for k in range(4):
         last = 1.0 if k == 3 else 0.0

@@ -63,6 +63,7 @@ class Offset7(ClosedForm):
         self.kernels = BatchKernels(g.params, branches_one, branches_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
         self._roll = rolled.roll_sense(robot)
+        self.tasks = (POSE, APPROACH) if self._roll != 0.0 else (POSE,)
         self._parameter = RedundancyParameter(f"theta{self.given + 1}", f"θ{self.given + 1}", joint=self.given)
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -78,10 +79,6 @@ class Offset7(ClosedForm):
         lean = front_or_back(stance, "the upper arm").times(-g.along)
         middle = _beside("wrist", "the shoulder", (5, 6), g.sign[1] * g.sign[2])
         return names_of((lean, elbow, middle), [(wrist, bend, side) for bend, side, wrist in eight()])
-
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction along the last joint's axis."""
-        return task == POSE or (task == APPROACH and self._roll != 0.0)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """The given joint; for an approach direction the roll or the last joint as well."""

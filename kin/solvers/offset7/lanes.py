@@ -16,10 +16,9 @@ from kin.angles import TURN, wrap
 from kin.kernels.compile import inlined, jit
 from kin.kernels.simd import atan2, sin_cos
 from kin.solvers.blocks import Entries, rows_of
-from kin.solvers.canonical import canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR
-from kin.solvers.offset7.branches import all_branches, distances
-from kin.solvers.offset7.geometry import D1, OFFSET, REACH, REVERSED, SIGN, Y4
+from kin.solvers.offset7.branches import all_branches, chain_pose, distances
+from kin.solvers.offset7.geometry import D1, OFFSET, REACH, SIGN, Y4
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -45,14 +44,8 @@ _LIMIT = TOLERANCES.limit
 @jit
 def set_up(params: Array, T: Array, box: Array, setup: Array) -> None:
     """setup ``(SETUP,)`` ← all that `lanes` needs of an arm, a target ``(4, 4)`` and limits, box ``(3, 7)``."""
-    X, N = np.empty((4, 4)), np.empty((4, 4))
-    for r in range(3):
-        shift = 0.0
-        for k in range(3):
-            X[r, k] = T[k, r] if params[REVERSED] > 0.0 else T[r, k]
-            shift -= T[k, r] * T[k, 3]
-        X[r, 3] = shift if params[REVERSED] > 0.0 else T[r, 3]
-    canonical_pose(params, X, N)
+    N = np.empty((3, 4))
+    chain_pose(params, T, N)
     for r in range(3):
         for k in range(4):
             setup[4 * r + k] = N[r, k]

@@ -59,6 +59,8 @@ class Pair2(ClosedForm):
         self.lengths = ()
         self.kernels = kernels_of(robot, POSE)
         self._rank = {task: self._ranks(task) for task in _TASKS}
+        # Every task, unless it leaves another joint free than the last.
+        self.tasks = tuple(task for task, (rank, free) in self._rank.items() if rank == robot.n - free)
         # Parallel axes: an elbow, which has two sides. Otherwise the values of joint 2 have no names.
         self.named = geometry.rows == 1 or (all(geometry.turns) and is_zero(*geometry.wave[:, 0, 2]))
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
@@ -84,13 +86,6 @@ class Pair2(ClosedForm):
             J = J[:, :3]
         free = bool(np.linalg.norm(J[:, :, -1], axis=1).max() < TOLERANCES.geometry)
         return int(np.linalg.matrix_rank(J, tol=TOLERANCES.geometry).max()), free
-
-    def handles(self, task: int) -> bool:
-        """Every task, unless it leaves another joint free than the last."""
-        if task not in _TASKS:
-            return False
-        rank, free = self._rank[task]
-        return rank == self.robot.n - free
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """The last joint, if it moves neither point nor direction; θ1 where what a task keeps is on axis 1."""

@@ -24,7 +24,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, front_or_back, names_of, stance_of
 from kin.solvers.parallel5.branches import ROWS, branches_many, branches_one, solve, solve_many
 from kin.solvers.parallel5.geometry import BASE, TOOL_Z, TURNED, Geometry, geometry_of
-from kin.solvers.singular import Condition, JointValue, Singularity, elbow_at, off_line, those_within
+from kin.solvers.singular import Condition, Singularity, by_angle, elbow_at, off_line, those_within
 from kin.transforms import Array
 
 NAME = "parallel5"
@@ -123,10 +123,9 @@ class Parallel5(ClosedForm):
         g = self.geometry
         t = g.sign * q + g.offset
         elbow, x = off_line(float(t[2])), self._x(t)
-        straight = (JointValue(2, float(q[2] - g.sign[2] * elbow)),)
         where: Condition = "tool on axis 1" if g.beside == 0.0 else "tool nearest to axis 1"
         return those_within(
             within,
-            Singularity("elbow", elbow_at(float(t[2])), "last axis along the arm", abs(elbow), "rad", straight),
+            by_angle("elbow", elbow_at(float(t[2])), "last axis along the arm", elbow, q, 2, g.sign[2]),
             Singularity("shoulder", where, "tool sideways", abs(x), "m"),
         )

@@ -23,7 +23,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, left_or_right, names_of, stance_of
 from kin.solvers.parallel6.batch import branches_many, branches_one, solve_many, solve_one
 from kin.solvers.parallel6.geometry import BASE, COS_TWIST, TOOL, Geometry, geometry_of
-from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
+from kin.solvers.singular import Singularity, by_angle, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -50,6 +50,7 @@ class Parallel6(ClosedForm):
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
+        self.tasks = (POSE, APPROACH) if g.tool_on_axis else (POSE,)
         self.lengths = (g.a1, g.a2, g.a3, g.a4, g.d5, g.beside)
         self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(6))
@@ -70,10 +71,6 @@ class Parallel6(ClosedForm):
         wrist = flipped(4, sense[4], g.offset[4], "axis 6 is parallel to axes 2, 3 and 4")
         rows = [(left, x_of_left * left * up, wrist) for left, up, wrist in eight()]
         return names_of((side, bent(2, sense[2], g.offset[2]), wrist), rows)
-
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """θ6: for a pose when axis 6 is parallel to axes 2, 3 and 4; for an approach direction always."""
@@ -121,19 +118,11 @@ class Parallel6(ClosedForm):
         elbow, x, wrist = off_line(t[2]), self._x_of_wrist(t), off_line(t[4])
         if min(abs(elbow), abs(x), abs(wrist)) > within:
             return ()  # as almost everywhere
-        straight, aligned = float(q[2] - g.sign[2] * elbow), float(q[4] - g.sign[4] * wrist)
         return those_within(
             within,
-            Singularity(
-                "elbow", elbow_at(t[2]), "axis 4 along the arm", abs(elbow), "rad", (JointValue(2, straight),)
-            ),
+            by_angle("elbow", elbow_at(t[2]), "axis 4 along the arm", elbow, q, 2, g.sign[2]),
             Singularity("shoulder", "wrist centre nearest to axis 1", "wrist centre along axis 2", abs(x), "m"),
-            Singularity(
-                "wrist",
-                "axis 6 parallel to axes 2, 3 and 4",
-                "tilt about the third axis",
-                abs(wrist),
-                "rad",
-                (JointValue(4, aligned),),
+            by_angle(
+                "wrist", "axis 6 parallel to axes 2, 3 and 4", "tilt about the third axis", wrist, q, 4, g.sign[4]
             ),
         )

@@ -62,6 +62,7 @@ class Planar4(ClosedForm):
     """The closed form of a planar arm with four joints."""
 
     name, title, reason = NAME, TITLE, "all four axes are parallel"
+    tasks = (POSE, APPROACH, POSITION)
 
     def __init__(self, params: Array, upright: bool, robot: Robot) -> None:
         self.robot, self.params, self.upright = robot, params, upright
@@ -75,10 +76,6 @@ class Planar4(ClosedForm):
         stance = stance_of(robot, p[BASE:TOOL].reshape(3, 4), float(p[OFFSET]), float(p[SIGN] * sense[0]))
         part = left_or_right(stance, "elbow", "the elbow", "the third axis").times(-1.0)
         return names_of((part,), [(1.0,), (-1.0,)])
-
-    def handles(self, task: int) -> bool:
-        """Every task."""
-        return task in (POSE, APPROACH, POSITION)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """The direction of the third link; θ4 as well where the tool may turn about the axes."""

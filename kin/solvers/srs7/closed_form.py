@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.axes import inverse, is_along, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
-from kin.solvers.canonical import Geometry7
+from kin.solvers.canonical import Geometry7, free_last
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -58,6 +58,7 @@ class Srs7(ClosedForm):
 
     def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
+        self.tasks = (POSE, APPROACH) if g.tool_on_axis else (POSE,)
         self.lengths = (g.d3, g.d5)
         self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
@@ -72,10 +73,6 @@ class Srs7(ClosedForm):
         )
         return names_of((front_or_back(stance, "the elbow"), elbow, wrist), eight())
 
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
-
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """The arm angle; for an approach direction joint 7 as well."""
         return (_PSI, _THETA7) if task == APPROACH else (_PSI,)
@@ -89,11 +86,8 @@ class Srs7(ClosedForm):
         values, all_arcs = out[:, 7:], [arcs[:count]]
         if free_roll:
             # Joint 7 turns the tool about its own axis and nothing else: it stays, or takes the requested value.
-            if not math.isnan(problem.values[1]):
-                out[:, 6] = np.where(np.isnan(out[:, 6]), math.nan, problem.values[1])
+            all_arcs.append(free_last(p, out[:, :7]))
             values = out[:, [7, 6]]
-            spans = [(i, problem.lower[6], problem.upper[6]) for i in range(8) if not math.isnan(out[i, 6])]
-            all_arcs.append(np.array(spans, dtype=np.float64).reshape(-1, 3))
         obstacle = None
         if code == TOO_FAR:
             obstacle = Obstacle("wrist centre too far from the shoulder", g.d3 + g.d5)

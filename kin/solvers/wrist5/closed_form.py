@@ -20,7 +20,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of, up_or_down
-from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
+from kin.solvers.singular import Singularity, by_angle, elbow_at, off_line, those_within
 from kin.solvers.wrist5 import point
 from kin.solvers.wrist5.batch import branches_many, branches_one, solve_many, solve_one
 from kin.solvers.wrist5.geometry import OFFSET, REACH, Geometry
@@ -62,6 +62,7 @@ class Wrist5(ClosedForm):
     """The closed form of a five-joint elbow arm with a two-axis wrist."""
 
     name, title, quick = NAME, TITLE, (POSE, APPROACH)
+    tasks = (POSE, APPROACH, POSITION)  # `kin.ik` judges the roll that a pose gets
     reason = (
         "axes 2 and 3 are parallel and perpendicular to axis 1, "
         "axes 3 and 4 meet at a right angle, and so do axes 4 and 5"
@@ -87,10 +88,6 @@ class Wrist5(ClosedForm):
             parts, rows = (parts[0], up_or_down(stance)), [(x, x * elbow, wrist) for x, elbow, wrist in rows]
         wrist = flipped(4, sense[4], g.offset[4], "the tool is in line with the forearm")
         return names_of((*parts, wrist), rows)
-
-    def handles(self, task: int) -> bool:
-        """A point, with or without an approach direction; :mod:`kin.ik` judges the roll that a pose gets."""
-        return task in (POSE, APPROACH, POSITION)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """θ4 and θ5 for a point alone; otherwise θ1 when the wrist centre is on axis 1, else nothing."""
@@ -131,19 +128,9 @@ class Wrist5(ClosedForm):
         reach = g.a1 + g.a2 * math.cos(t[1]) + g.d4 * math.cos(t[1] + t[2])
         if min(abs(elbow), abs(reach), abs(wrist)) > within:
             return ()  # as almost everywhere
-        straight, aligned = float(q[2]) - elbow, float(q[4]) - wrist
         return those_within(
             within,
-            Singularity(
-                "elbow",
-                elbow_at(t[2]),
-                "wrist centre along the arm",
-                abs(elbow),
-                "rad",
-                (JointValue(2, straight),),
-            ),
+            by_angle("elbow", elbow_at(t[2]), "wrist centre along the arm", elbow, q, 2),
             Singularity("shoulder", "wrist centre on axis 1", "wrist centre sideways", abs(reach), "m"),
-            Singularity(
-                "wrist", "tool along the forearm", "tilt sideways", abs(wrist), "rad", (JointValue(4, aligned),)
-            ),
+            by_angle("wrist", "tool along the forearm", "tilt sideways", wrist, q, 4),
         )

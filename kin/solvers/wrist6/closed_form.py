@@ -32,7 +32,7 @@ from kin.solvers.names import (
     stance_of,
     up_or_down,
 )
-from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
+from kin.solvers.singular import Singularity, by_angle, elbow_at, off_line, those_within
 from kin.solvers.wrist6.batch import branches_many, branches_one, solve_many, solve_one
 from kin.solvers.wrist6.geometry import BASE, TOOL, Geometry, geometry_of
 from kin.tolerances import TOLERANCES
@@ -60,6 +60,7 @@ class Wrist6(ClosedForm):
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
+        self.tasks = (POSE, APPROACH) if g.tool_on_axis else (POSE,)
         self.lengths = (g.a1, g.a2, g.f, g.beside)
         self.kernels = BatchKernels(g.params, branches_one, branches_many, seeded=solve_many)
         self.branches, self.meanings = self.names(robot, np.ones(6))
@@ -84,10 +85,6 @@ class Wrist6(ClosedForm):
 
     def _wrist(self, sense: Array) -> Part:
         return flipped(4, sense[4], self.geometry.offset[4], "axes 4 and 6 are in line")
-
-    def handles(self, task: int) -> bool:
-        """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
-        return task == POSE or (task == APPROACH and self.geometry.tool_on_axis)
 
     def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
         """θ1 where the wrist centre can be on axis 1; for an approach direction joint 6 as well."""
@@ -143,17 +140,9 @@ class Wrist6(ClosedForm):
         elbow, x, wrist = off_line(t[2]), self._x_of_wrist(t), off_line(t[4])
         if min(abs(elbow), abs(x), abs(wrist)) > within:
             return ()  # as almost everywhere
-        straight, aligned = float(q[2] - g.sign[2] * elbow), float(q[4] - g.sign[4] * wrist)
         return those_within(
             within,
-            Singularity(
-                "elbow",
-                elbow_at(t[2]),
-                "wrist centre along the arm",
-                abs(elbow),
-                "rad",
-                (JointValue(2, straight),),
-            ),
+            by_angle("elbow", elbow_at(t[2]), "wrist centre along the arm", elbow, q, 2, g.sign[2]),
             Singularity(
                 "shoulder",
                 "wrist centre on axis 1" if self._reaches_axis_1 else "wrist centre nearest to axis 1",
@@ -161,12 +150,5 @@ class Wrist6(ClosedForm):
                 abs(x),
                 "m",
             ),
-            Singularity(
-                "wrist",
-                "axes 4 and 6 in line",
-                "tilt about the third axis",
-                abs(wrist),
-                "rad",
-                (JointValue(4, aligned),),
-            ),
+            by_angle("wrist", "axes 4 and 6 in line", "tilt about the third axis", wrist, q, 4, g.sign[4]),
         )
