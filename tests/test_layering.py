@@ -179,7 +179,7 @@ RULES: dict[str, set[str]] = {
         "app.exports",
         "app.shared",
     },
-    "app/cli/parser.py": {"kin", "app.bench.command", "app.cli", "app.servos.command"},
+    "app/cli/parser.py": {"kin", "app.cli"},
     "app/cli/arguments/completion.py": {"kin", "shtab"},
     "app/cli/arguments": {"app.cli.arguments", "app.shared.options"},
     "app/cli/bodies.py": {"kin", "app.viewer.meshes"},
@@ -204,7 +204,9 @@ RULES: dict[str, set[str]] = {
     "app/servos/command.py": {
         *("kin", "app.live", "app.notebook.process", "app.servos", "app.viewer.session.state"),
     },
-    "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
+    "app/cli/open.py": {
+        *("app.classroom.tokens", "app.cli", "app.live", "app.servos.command", "app.viewer.session.state"),
+    },
 }
 
 MODULES = sorted(

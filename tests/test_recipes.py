@@ -139,7 +139,7 @@ RECIPES: dict[str, dict[str, str | list[tuple[str, str]]]] = {
                 '= (\n    Format("xyz", "text/plain", "three numbers per line", _xyz),\n    Format(',
             ),
         ],
-        "app/cli/arguments/__init__.py": [('"ndjson", "bin")', '"ndjson", "bin", "xyz")')],
+        "app/cli/arguments/space.py": [('"ndjson", "bin")', '"ndjson", "bin", "xyz")')],
     },
 }
 # What a process of the copy finds.

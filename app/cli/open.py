@@ -38,3 +38,11 @@ def run(arguments: Namespace) -> int:
         return run_service(settings.on_this_machine(), open_browser=True, page=page, words=words)
     finally:
         gc.unfreeze()
+
+
+def run_so101(arguments: Namespace) -> int:
+    """``kinboard so101``; see `app.servos.command.run`."""
+    from app.cli.terminal import robot_of, store_of
+    from app.servos.command import run
+
+    return run(arguments, robot_of(arguments), store_of(arguments).robots)

@@ -4,7 +4,7 @@ Input and output are in degrees and millimetres, with ``--rad`` in radians and m
 answers, problem documents included, and files of rows are in radians and metres. Exit codes: 0 success, 1 no exact
 solution (``ik``) or the service could not start, 2 invalid input, 130 interrupted.
 
-A command is a row of `COMMANDS`: its arguments (:mod:`app.cli.arguments`) and the module that runs it. That is
+A command is a row of `COMMANDS`: its arguments (:mod:`app.cli.arguments`) and the function that runs it, which is
 imported after parsing.
 """
 
@@ -16,16 +16,12 @@ import os
 import re
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, NoReturn
+from importlib import import_module
+from typing import NamedTuple, NoReturn
 
-from app.cli import arguments as declare
-from app.cli.arguments.agents import add_mcp
-from app.cli.arguments.calibrate import add_calibrate
-from app.cli.arguments.postures import add_cuspidal, add_postures
+from app.cli.arguments import arms, kinematics, service, space
 from app.cli.arguments.shared import Parents
-from app.cli.arguments.singularity import add_singularity
-from app.cli.arguments.so101 import add_so101
-from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
+from app.cli.classroom import arguments as classroom
 from app.cli.startup import no_collections
 
 DESCRIPTION = "Kinematics of robot arms: a dashboard in the browser, a REST interface, this command line."
@@ -38,7 +34,6 @@ EPILOG = """examples:
   kinboard check my-arm.toml
   kinboard import arm.urdf --tip tool0 -o my-arm.toml"""
 
-Run = Callable[[argparse.Namespace], int]
 _NEGATIVE = re.compile(r"-(?:[\d.(]|π|(?:pi|inf|nan)\b)", re.IGNORECASE)
 
 
@@ -47,13 +42,21 @@ class Command(NamedTuple):
 
     Attributes:
         name: the first word of the command line.
-        declare: adds its arguments.
-        load: imports the function that runs it and returns the exit code.
+        declare: adds its own arguments; its docstring is what the help says about the command.
+        run: where the function is that runs it and returns the exit code: a module, seen from here, and its name.
+        shared: the arguments that it has in common with others, as attributes of `Parents`.
     """
 
     name: str
-    declare: Callable[[Any, Parents], argparse.ArgumentParser]
-    load: Callable[[], Run]
+    declare: Callable[[argparse.ArgumentParser], None]
+    run: str
+    shared: str = ""
+
+    def load(self) -> Callable[[argparse.Namespace], int]:
+        """The function, imported."""
+        module, _, name = self.run.partition(":")
+        found: Callable[[argparse.Namespace], int] = getattr(import_module(module, __package__), name)
+        return found
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -65,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # for terminals that cannot print θ or ·
     try:
         with no_collections():
-            parser = _parser(words[0])
+            parser = parser_of(words[0])
         arguments, unknown = parser.parse_known_args([_not_an_option(word) for word in words])
         if unknown:
             arguments.parser.error("unrecognized arguments: " + " ".join(unknown))
@@ -126,7 +129,7 @@ def subcommands(
 ) -> dict[str, argparse.ArgumentParser]:
     """The parsers of all commands by name, those of actions (``room open``) included."""
     found: dict[str, argparse.ArgumentParser] = {}
-    for each in (parser or _parser())._actions:
+    for each in (parser or parser_of())._actions:
         if isinstance(each, argparse._SubParsersAction):
             for word, below in each.choices.items():
                 found |= {f"{name}{word}": below} | subcommands(below, f"{name}{word} ")
@@ -148,7 +151,7 @@ class _Parser(argparse.ArgumentParser):
         raise _UsageError(self, message)
 
 
-def _parser(name: str = "") -> argparse.ArgumentParser:
+def parser_of(name: str = "") -> argparse.ArgumentParser:
     """The parser of one command; without its name, or for a name that there is not, that of all."""
     parser = _Parser(
         prog="kinboard",
@@ -160,7 +163,10 @@ def _parser(name: str = "") -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     parents = Parents()
     for command in [each for each in COMMANDS if each.name == name] or COMMANDS:
-        declared = command.declare(subparsers, parents)
+        about = (command.declare.__doc__ or "").removesuffix(".")
+        shared = [getattr(parents, each) for each in command.shared.split()]
+        declared = subparsers.add_parser(command.name, help=about[:1].lower() + about[1:], parents=shared)
+        command.declare(declared)
         declared.set_defaults(command=command, parser=declared)
     return parser
 
@@ -175,224 +181,48 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+def run_completion(arguments: argparse.Namespace) -> int:
+    """Print what the shell completes."""
+    from app.cli.arguments.completion import script
+
+    parser = parser_of()
+    print(script(arguments.shell, parser, subcommands(parser).values()))
+    return 0
+
+
 def _not_an_option(word: str) -> str:
     """Negative numbers such as -1e-3 or -pi/2 look like options to argparse; with a leading space they do not."""
     return f" {word}" if _NEGATIVE.match(word) else word
 
 
-def _load_serve() -> Run:
-    from app.cli.serve import run
-
-    return run
-
-
-def _load_open() -> Run:
-    from app.cli.open import run
-
-    return run
-
-
-def _load_so101() -> Run:
-    from app.cli.terminal import robot_of, store_of
-    from app.servos.command import run
-
-    def run_so101(arguments: argparse.Namespace) -> int:
-        return run(arguments, robot_of(arguments), store_of(arguments).robots)
-
-    return run_so101
-
-
-def _load_mcp() -> Run:
-    from app.cli.serve import run_mcp
-
-    return run_mcp
-
-
-def _load_fk() -> Run:
-    from app.cli.fk import run
-
-    return run
-
-
-def _load_ik() -> Run:
-    from app.cli.ik import run
-
-    return run
-
-
-def _load_robots() -> Run:
-    from app.cli.robots import run
-
-    return run
-
-
-def _load_workspace() -> Run:
-    from app.cli.workspace import run
-
-    return run
-
-
-def _load_bench() -> Run:
-    for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):  # read at import: every library uses one thread
-        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
-    from app.bench.command import bench
-
-    return bench
-
-
-def _load_check() -> Run:
-    from app.cli.files import run_check
-
-    return run_check
-
-
-def _load_compare() -> Run:
-    from app.cli.robots import run_compare
-
-    return run_compare
-
-
-def _load_motors() -> Run:
-    from app.cli.robots import run_motors
-
-    return run_motors
-
-
-def _load_calibrate() -> Run:
-    from app.cli.calibrate import run
-
-    return run
-
-
-def _load_doctor() -> Run:
-    from app.cli.files import run_doctor
-
-    return run_doctor
-
-
-def _load_move() -> Run:
-    from app.cli.move import run
-
-    return run
-
-
-def _load_way() -> Run:
-    from app.cli.way import run
-
-    return run
-
-
-def _load_singularity() -> Run:
-    from app.cli.way import run_out
-
-    return run_out
-
-
-def _load_code() -> Run:
-    from app.cli.files import run_code
-
-    return run_code
-
-
-def _load_page() -> Run:
-    from app.cli.page import run
-
-    return run
-
-
-def _load_completion() -> Run:
-    from app.cli.arguments.completion import script
-
-    def run(arguments: argparse.Namespace) -> int:
-        parser = _parser()
-        print(script(arguments.shell, parser, subcommands(parser).values()))
-        return 0
-
-    return run
-
-
-def _load_import() -> Run:
-    from app.cli.files import run_import
-
-    return run_import
-
-
-def _load_export() -> Run:
-    from app.cli.files import run_export
-
-    return run_export
-
-
-def _load_capability() -> Run:
-    from app.cli.capability import run
-
-    return run
-
-
-def _load_cuspidal() -> Run:
-    from app.cli.workspace import run_cuspidal
-
-    return run_cuspidal
-
-
-def _load_postures() -> Run:
-    from app.cli.workspace import run_postures
-
-    return run_postures
-
-
-def _load_room() -> Run:
-    from app.cli.classroom.room import run
-
-    return run
-
-
-def _load_result() -> Run:
-    from app.cli.classroom.result import run_result
-
-    return run_result
-
-
-def _load_results() -> Run:
-    from app.cli.classroom.result import run_results
-
-    return run_results
-
-
-def _load_lti() -> Run:
-    from app.cli.classroom.lti import run
-
-    return run
-
-
 COMMANDS = (
-    Command("serve", declare.add_serve, _load_serve),
-    Command("open", declare.add_open, _load_open),
-    Command("so101", add_so101, _load_so101),
-    Command("mcp", add_mcp, _load_mcp),
-    Command("fk", declare.add_fk, _load_fk),
-    Command("ik", declare.add_ik, _load_ik),
-    Command("move", declare.add_move, _load_move),
-    Command("way", declare.add_way, _load_way),
-    Command("singularity", add_singularity, _load_singularity),
-    Command("page", declare.add_page, _load_page),
-    Command("code", declare.add_code, _load_code),
-    Command("robots", declare.add_robots, _load_robots),
-    Command("workspace", declare.add_workspace, _load_workspace),
-    Command("postures", add_postures, _load_postures),
-    Command("cuspidal", add_cuspidal, _load_cuspidal),
-    Command("room", add_room, _load_room),
-    Command("result", add_result, _load_result),
-    Command("results", add_results, _load_results),
-    Command("lti", add_lti, _load_lti),
-    Command("bench", declare.add_bench, _load_bench),
-    Command("check", declare.add_check, _load_check),
-    Command("compare", declare.add_compare, _load_compare),
-    Command("motors", declare.add_motors, _load_motors),
-    Command("calibrate", add_calibrate, _load_calibrate),
-    Command("doctor", declare.add_doctor, _load_doctor),
-    Command("capability", declare.add_capability, _load_capability),
-    Command("import", declare.add_import, _load_import),
-    Command("export", declare.add_export, _load_export),
-    Command("completion", declare.add_completion, _load_completion),
+    Command("serve", service.add_serve, ".serve:run", "robots"),
+    Command("open", service.add_open, ".open:run", "robots"),
+    Command("so101", service.add_so101, ".open:run_so101", "robots"),
+    Command("mcp", service.add_mcp, ".serve:run_mcp", "robots"),
+    Command("fk", kinematics.add_fk, ".fk:run", "arm robots output pendant frames"),
+    Command("ik", kinematics.add_ik, ".ik:run", "arm robots output pendant joints frames"),
+    Command("move", kinematics.add_move, ".move:run", "arm robots output frames"),
+    Command("way", kinematics.add_way, ".way:run", "arm robots output mounts"),
+    Command("singularity", kinematics.add_singularity, ".way:run_out", "arm robots output pendant mounts"),
+    Command("page", arms.add_page, ".page:run", "arm robots output mounts"),
+    Command("code", arms.add_code, ".files:run_code", "arm robots"),
+    Command("robots", arms.add_robots, ".robots:run", "robots output"),
+    Command("workspace", space.add_workspace, ".workspace:run", "arm robots output joints"),
+    Command("postures", space.add_postures, ".workspace:run_postures", "arm robots output joints"),
+    Command("cuspidal", space.add_cuspidal, ".workspace:run_cuspidal", "arm robots output joints"),
+    Command("room", classroom.add_room, ".classroom.room:run"),
+    Command("result", classroom.add_result, ".classroom.result:run_result"),
+    Command("results", classroom.add_results, ".classroom.result:run_results"),
+    Command("lti", classroom.add_lti, ".classroom.lti:run"),
+    Command("bench", service.add_bench, "..bench:run"),
+    Command("check", arms.add_check, ".files:run_check", "robots output"),
+    Command("compare", arms.add_compare, ".robots:run_compare", "robots output"),
+    Command("motors", arms.add_motors, ".robots:run_motors", "arm robots output"),
+    Command("calibrate", arms.add_calibrate, ".calibrate:run", "arm robots output mounts"),
+    Command("doctor", arms.add_doctor, ".files:run_doctor"),
+    Command("capability", space.add_capability, ".capability:run", "arm robots output joints"),
+    Command("import", arms.add_import, ".files:run_import"),
+    Command("export", arms.add_export, ".files:run_export", "arm robots"),
+    Command("completion", service.add_completion, ".parser:run_completion"),
 )

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
+from argparse import ArgumentParser
 from functools import cached_property
 
 from app.cli.arguments.options import UNITS_NOTE, add_options
 from app.cli.arguments.values import frame, workpiece
+
+ROBOT_HELP = "id of the robot (`kinboard robots` lists them), or a robot file (*.toml, *.urdf)"
+XYZ = ("X", "Y", "Z")
 
 
 class Parents:
     """Arguments that several commands share, as parent parsers.
 
     Attributes:
+        arm: the robot.
         robots: ``--robots``, the folder of further robot files.
         output: ``--json`` and the units.
         joints: ``--lock`` and ``--limit``.
@@ -22,9 +26,11 @@ class Parents:
     """
 
     def __init__(self) -> None:
-        self.robots = argparse.ArgumentParser(add_help=False)
+        self.arm = ArgumentParser(add_help=False)
+        self.arm.add_argument("robot", metavar="ROBOT", help=ROBOT_HELP)
+        self.robots = ArgumentParser(add_help=False)
         self.robots.add_argument("--robots", metavar="FOLDER", help="folder with further robot files (*.toml)")
-        self.output = argparse.ArgumentParser(add_help=False)
+        self.output = ArgumentParser(add_help=False)
         self.output.add_argument(
             "--json", action="store_true", help="print the result as JSON, in radians and metres"
         )
@@ -39,13 +45,13 @@ class Parents:
             default=False,
             help="read and print radians and metres",
         )
-        self.pendant = argparse.ArgumentParser(add_help=False)
+        self.pendant = ArgumentParser(add_help=False)
         self.pendant.add_argument(
             "--pendant",
             action="store_true",
             help="read and print joint values as the arm's pendant shows them (pendant in its file)",
         )
-        self.mounts = argparse.ArgumentParser(add_help=False)
+        self.mounts = ArgumentParser(add_help=False)
         for flag, about in (
             (
                 "--tool",
@@ -56,7 +62,7 @@ class Parents:
             self.mounts.add_argument(
                 flag, type=frame, metavar="X:Y:Z[:ROLL:PITCH:YAW]", help=f"{about}; {UNITS_NOTE}"
             )
-        self.frames = argparse.ArgumentParser(add_help=False, parents=[self.mounts])
+        self.frames = ArgumentParser(add_help=False, parents=[self.mounts])
         self.frames.add_argument(
             "--workpiece",
             type=workpiece,
@@ -68,8 +74,18 @@ class Parents:
         )
 
     @cached_property
-    def joints(self) -> argparse.ArgumentParser:
+    def joints(self) -> ArgumentParser:
         """``--lock`` and ``--limit``; options of inverse kinematics, for which the core is imported."""
-        parser = argparse.ArgumentParser(add_help=False)
+        parser = ArgumentParser(add_help=False)
         add_options(parser, ["limits", "locked", "wider_limits"])
         return parser
+
+
+def add_dask(parser: ArgumentParser) -> None:
+    """The argument of the commands whose work a cluster can do."""
+    parser.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="compute on the workers of this Dask scheduler, such as tcp://host:8786; "
+        "`pip install 'kinboard[cluster]'` installs what that needs",
+    )

@@ -1,4 +1,4 @@
-"""Names and whole numbers as they are typed on the command line.
+"""Names and plain numbers as they are typed on the command line.
 
 Other numbers stay texts here: their units depend on the arm, and `app.cli.terminal` reads them.
 """
@@ -19,6 +19,14 @@ def count(text: str) -> int:
     if not value.is_integer():
         raise ValueError
     return int(value)
+
+
+def positive(text: str) -> float:
+    """A number above 0."""
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise ValueError
+    return value
 
 
 def _ascii(text: str) -> str:
@@ -51,3 +59,4 @@ def frame(text: str) -> list[str]:
 
 # argparse reports "invalid <name> value".
 whole_number.__name__ = count.__name__ = "whole number"
+positive.__name__ = "number above 0"

@@ -2,6 +2,7 @@
 
 import csv
 import gc
+import inspect
 import json
 import math
 import re
@@ -468,6 +469,11 @@ def test_the_ways_out_may_be_as_the_pendant_shows_them(capsys):
 
 def test_each_row_of_the_commands_is_named_as_the_command():
     assert [name for name in parser.subcommands() if " " not in name] == [each.name for each in parser.COMMANDS]
+
+
+def test_each_row_of_the_commands_names_a_function_that_runs_it():
+    for command in parser.COMMANDS:
+        assert list(inspect.signature(command.load()).parameters) == ["arguments"], command.name
 
 
 def test_version_and_help(capsys):

@@ -10,7 +10,7 @@ import pytest
 
 import kin
 from app.cli import parser
-from app.cli.arguments import POSE_FORMS
+from app.cli.arguments.kinematics import POSE_FORMS
 from kin.poses import FORMS
 
 DOWN = np.diag([1.0, -1.0, -1.0])
