@@ -72,7 +72,7 @@ TRUSTED = {
     "app/viewer/own_arm.py": "what it has written itself",
     "app/viewer/room/views.py": "a course of our database",
     "app/viewer/scene/bodies/drawing.py": "a file of ours",
-    "app/equations/chapter.py": "code of ours",
+    "app/equations/expression.py": "code of ours",
     "kin/codegen/source.py": "code of ours",
     "kin/kernels": "the folder of compiled kernels",
 }

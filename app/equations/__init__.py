@@ -7,7 +7,6 @@ REST and the viewer read them from a `Book`.
 from app.equations.books import (
     Book,
     DerivationError,
-    Equation,
     NotDerivedError,
     Values,
     book,
@@ -16,6 +15,7 @@ from app.equations.books import (
 )
 from app.equations.compare import Compared, compared, gram, suspects
 from app.equations.derive import Line
+from app.equations.equation import Equation
 from app.equations.symbols import Symbol
 
 __all__ = [

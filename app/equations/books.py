@@ -15,14 +15,13 @@ from typing import Literal
 import numpy as np
 
 from app.equations import chapter
-from app.equations.derive import AXES, COLUMNS, Line, derive
-from app.equations.expression import Expression, astray, from_text, names, value, written_out
+from app.equations.derive import Line, derive
+from app.equations.equation import AXES, Equation, turned
+from app.equations.expression import Expression, from_text, names, value, written_out
 from app.equations.symbols import Symbol, chapter_symbols
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from kin import Robot, fk, get_robot
 from kin.transforms import Array
-
-Verdict = Literal["right", "misprinted", "unreadable", "derived"]
 
 CHECKED = 1000  # random configurations at which a derived form is checked
 AGREES = 1e-12  # tolerance, relative to the size of the arm; absolute for directions
@@ -40,61 +39,11 @@ class NotDerivedError(DerivationError):
 
 
 @dataclass(frozen=True)
-class Equation:
-    """One equation: an entry of ``T_base_tool = [n o a p]``.
-
-    Attributes:
-        id: its key within the book: the chapter's number, or the entry for a derived one.
-        number: the chapter's number; None for a derived one.
-        entry: which entry, e.g. ``"p_x"``; ``"T"`` for the whole matrix.
-        verdict: what is to be thought of it.
-        printed: as the chapter prints it; None for derived and unreadable ones.
-        correct: what equals the DH product; None for the unreadable one.
-        note: what is wrong with the printed form.
-        worst: for a misprinted one, the configuration inside the limits, in radians, where that shows most.
-    """
-
-    id: str
-    number: int | None
-    entry: str
-    verdict: Verdict
-    printed: Expression | None
-    correct: Expression | None
-    note: str = ""
-    worst: tuple[float, ...] = ()
-
-    @property
-    def index(self) -> tuple[int, int]:
-        """Row and column in T_base_tool; raises ValueError for the whole matrix."""
-        column, row = self.entry.split("_")
-        return AXES.index(row), COLUMNS.index(column)
-
-    @property
-    def is_length(self) -> bool:
-        """Whether it is in metres: an entry of p. Else a pure number."""
-        return self.entry[0] == "p"
-
-    @cached_property
-    def wrong_terms(self) -> tuple[bool, ...]:
-        """For each outer term of `printed`, whether it is a misprint."""
-        assert self.printed is not None
-        assert self.correct is not None
-        return astray(self.printed, self.correct)
-
-    @cached_property
-    def mended_terms(self) -> tuple[bool, ...]:
-        """For each outer term of `correct`, whether the print has it wrong or lacks it."""
-        assert self.printed is not None
-        assert self.correct is not None
-        return astray(self.correct, self.printed)
-
-
-@dataclass(frozen=True)
 class Values:
     """One equation at configurations: arrays ``(...)``, in metres for p, else pure numbers.
 
     `printed` is None where nothing is printed. `difference` and `turn` are those of what is on show, the printed
-    form if there is one, from the DH product: the latter as an angle, see `app.equations.chapter.turned`.
+    form if there is one, from the DH product: the latter as an angle, see `app.equations.equation.turned`.
     """
 
     printed: Array | None
@@ -154,7 +103,7 @@ class Book:
         *printed, correct = (np.broadcast_to(value(form, values), q.shape[:-1]) for form in forms)
         dh = T[(..., *equation.index)]
         shown = printed[0] if printed else correct
-        turn = chapter.turned(T, equation.index, shown)
+        turn = turned(T, equation.index, shown)
         return Values(printed[0] if printed else None, correct, dh, shown - dh, turn)
 
     def lines_of(self, equation: Equation) -> list[Line]:
@@ -235,7 +184,7 @@ _BOOKS: ComputationCache[Book] = ComputationCache(ThreadPoolExecutor(1, thread_n
 
 
 def _make(robot: Robot, computation: SharedComputation[Book]) -> Book:
-    if robot.id in chapter.LENGTHS and robot == get_robot(robot.id):
+    if robot.id in chapter.EQUATIONS and robot == get_robot(robot.id):
         return _chapter_book(robot)
     derived = derive(robot)
     computation.check()
@@ -263,20 +212,7 @@ def check(found: Book) -> None:
 
 
 def _chapter_book(robot: Robot) -> Book:
-    verdicts: dict[str, Verdict] = {"right": "right", "wrong": "misprinted", "garbled": "unreadable"}
-    equations = tuple(
-        Equation(
-            str(e.number),
-            e.number,
-            e.entry,
-            verdicts[e.verdict],
-            from_text(e.printed) if e.printed else None,
-            from_text(e.corrected) if e.corrected else None,
-            e.note,
-            tuple(math.radians(angle) for angle in e.worst_at),
-        )
-        for e in chapter.equations(robot.id)
-    )
+    equations = chapter.EQUATIONS[robot.id]
     used = {name for e in equations for form in (e.printed, e.correct) if form is not None for name in names(form)}
     lines = tuple(Line(name, from_text(text)) for name, text in chapter.ABBREVIATIONS.items() if name in used)
     return Book(robot, "chapter", chapter_symbols(robot), lines, equations)

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from app.equations.equation import AXES, COLUMNS
 from app.equations.expression import Expression, Name, Negative, Number, Sum, add, multiply, negative, size
 from app.equations.symbols import Symbol, Turn, length, trig
 from app.equations.typeset import glyphs
@@ -34,8 +35,6 @@ from kin.transforms import Array
 
 LONGEST = 24  # names in one entry
 MOST_LINKS = 5  # multiplied without names in between
-COLUMNS = "noap"
-AXES = "xyz"
 
 Order = tuple[int, tuple[int, ...], str]
 

@@ -15,7 +15,6 @@ from itertools import product
 
 import numpy as np
 
-from app.equations import chapter
 from kin.transforms import Array
 
 
@@ -129,15 +128,22 @@ def add(parts: list[Expression]) -> Expression:
 
 
 def from_text(text: str) -> Expression:
-    """An expression of the chapter's notation, in the order of the text; raises ValueError as `chapter.parse`."""
-    return _from_ast(chapter.parse(text))
+    """An expression of names, ``+``, ``-``, ``*`` and parentheses, in the order of the text.
+
+    Raises:
+        ValueError: the text contains anything else. It is never executed, only walked.
+    """
+    try:
+        return _from_ast(ast.parse(text, mode="eval").body)
+    except SyntaxError as error:
+        raise ValueError(f"not an expression of the chapter's notation: {text!r} ({error.msg})") from None
 
 
 def _from_ast(node: ast.expr) -> Expression:
     match node:
         case ast.Name(id=name):
             return Name(name)
-        case ast.UnaryOp(operand=inner):
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
             return negative(_from_ast(inner))
         case ast.BinOp(left=left, op=ast.Mult(), right=right):
             return multiply([_from_ast(left), _from_ast(right)])

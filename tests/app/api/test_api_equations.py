@@ -35,7 +35,7 @@ def post(client, robot, q):
 def test_every_arm_has_its_equations(client, robot):
     answer = get(client, robot)
     assert TypeAdapter(EquationsAnswer).validate_python(answer, strict=True) == answer
-    printed = robot.id in chapter.LENGTHS
+    printed = robot.id in chapter.EQUATIONS
     assert answer["source"] == ("chapter" if printed else "derived")
     entries = [equation["name"] for equation in answer["equations"] if equation["name"] != "T"]
     assert sorted(entries) == sorted(f"{column}_{row}" for column in "noap" for row in "xyz")
@@ -55,17 +55,16 @@ def test_every_arm_has_its_equations(client, robot):
         assert formula["latex"].count("{") == formula["latex"].count("}")
 
 
-@pytest.mark.parametrize("robot_id", list(chapter.LENGTHS))
+@pytest.mark.parametrize("robot_id", list(chapter.EQUATIONS))
 def test_the_chapters_equations_are_listed_with_their_verdicts(client, robot_id):
     answer = get(client, kin.get_robot(robot_id))
-    verdicts = {"right": "right", "wrong": "misprinted", "garbled": "unreadable"}
-    for row, equation in zip(answer["equations"], chapter.equations(robot_id), strict=True):
+    for row, equation in zip(answer["equations"], chapter.EQUATIONS[robot_id], strict=True):
         assert (row["reference"], row["name"], row["note"]) == (equation.number, equation.entry, equation.note)
-        assert row["verdict"] == verdicts[equation.verdict]
-        assert (row["as_printed"] is None) == (equation.verdict == "garbled")
-        wrong = equation.verdict == "wrong"
+        assert row["verdict"] == equation.verdict
+        assert (row["as_printed"] is None) == (equation.verdict == "unreadable")
+        wrong = equation.verdict == "misprinted"
         assert (row["corrected"] is not None) == wrong
-        assert row["worst_q"] == (np.radians(equation.worst_at).tolist() if wrong else None)
+        assert row["worst_q"] == (list(equation.worst) if wrong else None)
 
 
 def test_lengths_are_in_metres_and_angles_have_no_value(client):

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 import kin
 from app.equations import book, chapter, compared, gram, suspects
 from app.equations.compare import SMALLEST
-from app.equations.expression import from_text, names, value
+from app.equations.expression import names, value
 from kin.transforms import rotation_from_wxyz
 
-CHAPTER = tuple(kin.get_robot(robot_id) for robot_id in chapter.LENGTHS)
+CHAPTER = tuple(kin.get_robot(robot_id) for robot_id in chapter.EQUATIONS)
 each_robot = pytest.mark.parametrize("robot", CHAPTER, ids=lambda robot: robot.id)
 
 # By equation: how its terms differ from the right ones, and in which factors, with how many in all.
@@ -53,7 +53,6 @@ def test_the_terms_add_up_to_both_forms(robot):
     values = {name: symbol.value(q) for name, symbol in found.symbols.items()}
     for line in found.lines:
         values[line.name] = value(line.expression, values)
-    texts = {str(e.number): e for e in chapter.equations(robot.id)}
     for equation in found.equations:
         if equation.printed is None:
             continue
@@ -63,7 +62,7 @@ def test_the_terms_add_up_to_both_forms(robot):
             total = sum(value(term, values) for term in terms)
             assert np.allclose(total, value(form, values), rtol=0, atol=1e-14)
         differing = [row for row in rows if row.kind != "same"]
-        printed, right = (parsed(text) for text in (texts[equation.id].printed, texts[equation.id].corrected))
+        printed, right = in_sympy(equation.printed), in_sympy(equation.correct)
         symbols = {name: sympy.Symbol(name) for row in differing for name in symbols_in(row)}
         rest = sum(value(row.printed, symbols) if row.printed is not None else 0 for row in differing) - sum(
             value(row.correct, symbols) if row.correct is not None else 0 for row in differing
@@ -75,8 +74,7 @@ def symbols_in(row):
     return [name for term in (row.printed, row.correct) if term is not None for name in names(term)]
 
 
-def parsed(text):
-    form = from_text(text)
+def in_sympy(form):
     return value(form, {name: sympy.Symbol(name) for name in names(form)})
 
 

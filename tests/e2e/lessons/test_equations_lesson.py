@@ -8,7 +8,7 @@ from page import Tab
 from playwright.sync_api import Locator, expect
 
 import kin
-from app.equations import chapter
+from app.equations import book
 
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 
@@ -50,9 +50,9 @@ def test_equations_are_typeset_and_marked_and_the_largest_error_is_shown(tab: Ta
     expect(tab.page.get_by_text("Equation (6):")).to_be_visible()
     stays_inside(tab)
     tab.page.get_by_role("button", name="Show the worst pose").click()
-    worst = next(e for e in chapter.EQUATIONS if e.number == 6)
+    worst = book(PIONEER).equation("6").worst
     expect(off(tab)).to_contain_text("135 mm here")
-    tab.wait_for_tool(kin.fk(PIONEER, np.radians(worst.worst_at))[:3, 3], within=0.06)
+    tab.wait_for_tool(kin.fk(PIONEER, np.array(worst))[:3, 3], within=0.06)
     tab.screenshot("equations-worst")
     tab.choose("Equation", "(13) x of a ✕ misprinted")
     expect(off(tab)).to_contain_text("no difference at this pose")  # θ4 is 0 here

@@ -16,7 +16,7 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
-from app.equations import book, books, chapter, typeset
+from app.equations import book, books, typeset
 from app.equations.derive import derive
 from app.shared.clouds import Clouds
 from app.shared.computations import ComputationCache
@@ -68,15 +68,15 @@ def test_it_begins_with_a_misprint_and_its_values_follow_the_arm(tab: FakeBrowse
     tab.set("1 rotating base", 20)
     tab.set("2 rotating elbow", 41)
     q[1] = np.radians(41.0)
-    (row,) = (c for c in chapter.compare("pioneer5", q) if c.number == 6)
-    expected = [round(1000 * float(x), 1) for x in (row.printed, row.corrected, row.dh)]
+    row = book(PIONEER).values(book(PIONEER).equation("6"), q)
+    expected = [round(1000 * float(x), 1) for x in (row.printed, row.correct, row.dh)]
     tab.wait(lambda: values_shown(tab) == expected)
     assert f"<b>{1000 * abs(row.difference):.0f} mm</b> here, by 135 mm at worst" in tab.html
 
 
 def test_show_where_it_is_worst(tab: FakeBrowser) -> None:
     press(tab, "Show the worst pose")
-    worst = np.radians(next(e for e in chapter.EQUATIONS if e.number == 6).worst_at)
+    worst = np.array(book(PIONEER).equation("6").worst)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, worst), atol=1e-6))
     tab.wait(lambda: "<b>135 mm</b> here" in tab.html)
     assert "Equation (6) at its worst" in tab.html
