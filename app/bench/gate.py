@@ -7,14 +7,10 @@ the measured ones: they catch a lost compiled path or an allocation in a loop, n
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
-from app.bench.contestants import OURS, SOLVE_IK, Contestant
-from app.bench.rows import ROWS
-from app.bench.run import Report, Settings
+from app.bench.contestants import OURS, SOLVE_IK
+from app.bench.run import Report
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +57,6 @@ GATES: tuple[Gate, ...] = (
 )
 
 
-def quick_settings() -> Settings:
-    """The rows that have a gate, without peers, by the clock of this thread, which excludes other processes."""
-    rows = tuple(row for row in ROWS if row.id in {gate.row for gate in GATES})
-    quick = Settings(rows=rows, peers=()).quick()
-    return replace(quick, targets=8, rounds=10, clock=time.thread_time_ns)
-
-
 def judge(report: Report, gates: tuple[Gate, ...] = GATES) -> list[Verdict]:
     """Verdicts of all gates whose row was measured."""
     rows = {row.task.row.id: row for row in report.rows}
@@ -81,15 +70,3 @@ def judge(report: Report, gates: tuple[Gate, ...] = GATES) -> list[Verdict]:
                 Verdict(gate, floor.contestant.name.removeprefix("floor: "), entry.turns.best / floor.turns.best)
             )
     return found
-
-
-def slowed(contestant: Contestant, times: int) -> Contestant:
-    """The contestant with every call repeated, to test that the gate detects it."""
-    call: Callable[..., Any] = contestant.call
-
-    def slow(*arguments: Any) -> Any:
-        for _ in range(times - 1):
-            call(*arguments)
-        return call(*arguments)
-
-    return replace(contestant, call=slow)

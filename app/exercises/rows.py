@@ -7,13 +7,14 @@ wherever on the axis its origin is; the lesson asks besides for what the student
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from app.exercises.typed import read_number
-from kin import InputError
+from kin import InputError, Joint
 from kin.axes import screw_x, screw_z
 from kin.robot import Convention
 from kin.transforms import Array
@@ -57,6 +58,12 @@ class Row:
     a: float
     alpha: float
 
+    @classmethod
+    def of(cls, row: Joint, value: float = 0.0) -> Row:
+        """A row of an arm, with the value of its joint added."""
+        turned, slid = (value, 0.0) if row.kind == "revolute" else (0.0, value)
+        return cls(row.theta + turned, row.d + slid, row.a, row.alpha)
+
     def matrix(self, convention: Convention) -> Array:
         """Its product of four motions ``(4, 4)``."""
         first, second = screw_z(self.theta, self.d), screw_x(self.a, self.alpha)
@@ -94,6 +101,14 @@ class Miss(NamedTuple):
 def angle_between(one: Array, other: Array) -> float:
     """The angle between two directions ``(3,)``, 0 to π."""
     return math.atan2(float(np.linalg.norm(np.cross(one, other))), float(one @ other))
+
+
+def typed_rows(rows: Sequence[Row]) -> list[list[str]]:
+    """Rows as a student may type them: with all digits, in the units of a student without a choice."""
+    return [
+        [repr(value * Units().of(angular).scale) for value, angular in zip(astuple(row), ANGULAR, strict=True)]
+        for row in rows
+    ]
 
 
 def read_rows(given: object, count: int, first: int, units: Units) -> list[Row]:

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from kin import Joint, Obstacle, Robot, builtin_robots, robot_to_dict
+from kin.axes import screw_x, screw_z
 from kin.ik import Task
 from kin.transforms import Array, wxyz_from_rotation
 
@@ -253,11 +254,8 @@ SNIPPETS: dict[str, Callable[[Moment], str]] = {
 
 def row_transform(row: Joint, value: float, convention: str) -> Array:
     """The transform ``(4, 4)`` of one DH row at a joint value (0 for a fixed row)."""
-    theta = row.theta + (value if row.kind == "revolute" else 0.0)
-    d = row.d + (value if row.kind == "prismatic" else 0.0)
-    c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(row.alpha), math.sin(row.alpha)
-    turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
-    twist = np.array([[1, 0, 0, row.a], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
+    turned, slid = (value, 0.0) if row.kind == "revolute" else (0.0, value)
+    turn, twist = screw_z(row.theta + turned, row.d + slid), screw_x(row.a, row.alpha)
     return np.asarray(twist @ turn if convention == "modified" else turn @ twist)
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 import kin
 from app.exercises import cell
-from app.exercises.contract import Kind, typed
+from app.exercises.contract import Kind
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
-from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Line, Row, angle_between, read_rows
+from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Line, Row, angle_between, read_rows, typed_rows
 from app.exercises.variant import Variant
 from kin import Robot
 from kin.robot import CONVENTIONS, Convention
@@ -148,12 +148,7 @@ class DHKind(Kind):
         return ""
 
     def answer(self, variant: Variant) -> object:
-        units = Units()
-        rows = _rows_at(self._arm(variant), variant.q)[self.first : self.last + 1]
-        return [
-            [typed(value, units.of(angular)) for value, angular in zip(astuple(row), ANGULAR, strict=True)]
-            for row in rows
-        ]
+        return typed_rows(_rows_at(self._arm(variant), variant.q)[self.first : self.last + 1])
 
     def solution(self, variant: Variant, units: Units) -> str:
         rows = _rows_at(self._arm(variant), variant.q)[self.first : self.last + 1]
@@ -170,14 +165,8 @@ class DHKind(Kind):
 
 def _rows_at(arm: Robot, q: Array) -> list[Row]:
     """The rows with the joint values added."""
-    found: list[Row] = []
     values = dict(zip(arm.joint_rows, q.tolist(), strict=True))
-    for i, row in enumerate(arm.rows):
-        value = values.get(i, 0.0)
-        turns = row.kind == "revolute"
-        theta, d = row.theta + (value if turns else 0.0), row.d + (0.0 if turns else value)
-        found.append(Row(theta, d, row.a, row.alpha))
-    return found
+    return [Row.of(row, values.get(i, 0.0)) for i, row in enumerate(arm.rows)]
 
 
 def _chain(base: Array, rows: Sequence[Row], convention: Convention) -> list[Array]:

@@ -11,10 +11,10 @@ import numpy as np
 
 import kin
 from app.exercises import cell
-from app.exercises.contract import Kind, typed
+from app.exercises.contract import Kind
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
-from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Factor, Row, read_rows
+from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Factor, Row, read_rows, typed_rows
 from app.exercises.variant import Variant
 from kin import Robot
 from kin.comparison import messages
@@ -100,9 +100,9 @@ class MistakeKind(Kind):
             added += (
                 f"; row{'s' * (len(fixed) > 1)} {' and '.join(fixed)} {'is' if len(fixed) == 1 else 'are'} fixed"
             )
-        convention = "standard" if arm.convention == "standard" else "Craig’s"
+        convention = "the standard" if arm.convention == "standard" else "Craig’s"
         note = (
-            f"In {'the standard' if convention == 'standard' else convention} convention. {added}. "
+            f"In {convention} convention. {added}. "
             "Correct the table, so that equal joint values give the pose of the arm. "
             "The tab Robot shows the arm’s own table when the answer is known."
         )
@@ -137,10 +137,7 @@ class MistakeKind(Kind):
         return Verdict(False, " ".join(said))
 
     def answer(self, variant: Variant) -> object:
-        return [
-            [typed(value, Units().of(angular)) for value, angular in zip(astuple(row), ANGULAR, strict=True)]
-            for row in _rows(variant.robot)
-        ]
+        return typed_rows(_rows(variant.robot))
 
     def solution(self, variant: Variant, units: Units) -> str:
         arm, wrong = variant.robot, self._wrong(variant)
@@ -160,7 +157,7 @@ class MistakeKind(Kind):
 
 
 def _rows(robot: Robot) -> list[Row]:
-    return [Row(row.theta, row.d, row.a, row.alpha) for row in robot.rows]
+    return [Row.of(row) for row in robot.rows]
 
 
 def _texts(robot: Robot, units: Units) -> list[list[str]]:
