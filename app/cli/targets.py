@@ -15,20 +15,18 @@ import itertools
 import json
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.cli.pipes.columns import Columns
-from app.cli.pipes.parquet import arrow_with_parquet, opened_columns, rows_of
-from app.cli.pipes.poses import INVALID, Answers, Counted, PoseTable, Target, answered, target_of
-from app.cli.pipes.source import UTF16
+from app.cli.pipes.parquet import arrow_with_parquet
+from app.cli.pipes.poses import INVALID, Answers, Counted, Goal, PoseTable, answered
+from app.cli.pipes.source import opened_source
 from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
 from app.shared.threads import processors
@@ -61,7 +59,7 @@ class Question:
     strict: bool
     pendant: bool
 
-    def answers(self, targets: list[Target]) -> Answers:
+    def answers(self, targets: list[Goal]) -> Answers:
         """The answers to some targets."""
         placed = [each._replace(T=self.frame @ each.T) for each in targets]
         return answered(self.robot, placed, self.options, self.q_seed, self.strict, self.pendant)
@@ -95,7 +93,7 @@ def solve_file(question: Question, source: Path, output: Path, dask: str | None 
     if output.suffix.lower() == ".parquet":
         arrow_with_parquet("--output", str(output))
     try:
-        total = _count(source, question.table)
+        total = sum(1 for _ in _targets(source, 0, question.table))
         with _solvers(dask) as (pool, most):
             return _resumed(question, source, output, total, pool, most)
     except OSError as error:
@@ -150,7 +148,9 @@ def _answered(question: Question, source: Path, first: int, pool: Executor, most
     """The answers to the targets from the first one on, piece by piece in order; `most` pieces at a time."""
     waiting: deque[Future[Answers]] = deque()
     try:
-        for targets in _pieces(source, first, question.table):
+        reads = _targets(source, first, question.table)
+        while some := list(itertools.islice(reads, AT_ONCE)):
+            targets = [read() for read in some]
             waiting.append(pool.submit(question.answers, targets))
             if len(waiting) > most:
                 yield waiting.popleft().result()
@@ -198,96 +198,14 @@ def _written(output: Path, found: Answers) -> bytes:
     return text.getvalue().encode()
 
 
-def _count(source: Path, table: PoseTable) -> int:
-    """How many targets a file has."""
-    if source.suffix.lower() == ".csv":
-        count = sum(1 for _ in _lines(source, table))
-    elif source.suffix.lower() == ".parquet":
-        with _opened(source, table) as opened:
-            count = opened.metadata.num_rows
-    else:
-        count = len(_poses(source))
-    if not count:
-        raise InputError(_FIELD, str(source), "at least one target")
-    return count
-
-
-def _expected(table: PoseTable) -> str:
-    """What a file of targets may be."""
-    return "a .npy file of poses (k, 4, 4), or a .csv or .parquet file with the columns " + ", ".join(table.names)
-
-
-def _poses(source: Path) -> NDArray[Any]:
-    """The poses ``(k, 4, 4)`` of a .npy file, read when they are used."""
-    try:
-        found: NDArray[Any] = np.load(source, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError):
-        raise InputError(_FIELD, str(source), _expected(PoseTable())) from None
-    if (
-        not isinstance(found, np.ndarray)
-        or found.ndim != 3
-        or found.shape[1:] != (4, 4)
-        or found.dtype.kind != "f"
-    ):
-        raise InputError(_FIELD, str(source), _expected(PoseTable()))
-    return found
-
-
-def _pieces(source: Path, first: int, table: PoseTable) -> Iterator[list[Target]]:
-    """The targets from the first one on, some at a time."""
-    if source.suffix.lower() == ".parquet":
-        yield from _parquet_pieces(source, first, table)
-        return
-    if source.suffix.lower() != ".csv":
-        poses = _poses(source)
-        for start in range(first, len(poses), AT_ONCE):
-            some = np.ascontiguousarray(poses[start : start + AT_ONCE], dtype=np.float64)
-            yield [Target(f"{_FIELD}[{start + i}]", T) for i, T in enumerate(some)]
-        return
-    rows = itertools.islice(_lines(source, table), first, None)
-    while piece := list(itertools.islice(rows, AT_ONCE)):
-        yield [target_of(row, columns, table, place) for place, row, columns in piece]
-
-
-def _lines(source: Path, table: PoseTable) -> Iterator[tuple[str, list[str], Columns]]:
-    """The rows of a .csv file with the place of each, without the heading and empty lines."""
-    with source.open("rb") as file:
-        encoding = "utf-16" if file.read(2) in UTF16 else "utf-8-sig"
-    with source.open(newline="", encoding=encoding, errors="replace") as file:
-        preface = 0
-        while (line := file.readline()) and (not line.strip() or Columns.is_preface(line)):
-            preface += 1
-        separator = Columns.separator(line)
-        lines = (each.strip(" \r\n") + "\n" for each in itertools.chain([line], file))
-        rows, columns = csv.reader(lines, delimiter=separator, skipinitialspace=True), None
-        try:
-            for row in rows:
-                if columns is None:
-                    decimal = "." if separator == "," else ","
-                    columns = Columns.of(row, table.names, _FIELD, decimal)
-                    if columns.has_heading:
-                        continue
-                if row:
-                    yield f"{_FIELD} line {preface + rows.line_num}", row, columns
-        except csv.Error as error:
-            raise InputError(
-                f"{_FIELD} line {preface + rows.line_num}", str(error), "a row of a CSV file"
-            ) from None
-
-
-# -- Parquet ---------------------------------------------------------------------------------------------------
-
-
-def _opened(source: Path, table: PoseTable) -> AbstractContextManager[Any]:
-    """A Parquet file of targets, open."""
-    return opened_columns(source, table.names, _FIELD, _expected(table))
-
-
-def _parquet_pieces(source: Path, first: int, table: PoseTable) -> Iterator[list[Target]]:
-    """The targets of a Parquet file from the first one on."""
-    with _opened(source, table) as opened:
-        for place, rows in rows_of(opened, table.names, AT_ONCE, _FIELD, _expected(table), first):
-            yield [table.target(row, f"{_FIELD}[{place + i}]") for i, row in enumerate(rows.tolist())]
+def _targets(source: Path, first: int, table: PoseTable) -> Iterator[Callable[[], Goal]]:
+    """What reads each target of a file from the first one on."""
+    with opened_source(str(source), _FIELD) as opened:
+        if opened.form == "ndjson":
+            expected = "a .npy file of poses (k, 4, 4), or a .csv or .parquet file with the columns "
+            raise InputError(_FIELD, str(source), expected + ", ".join(table.names))
+        for some in opened.goals(table, first=first):
+            yield from some
 
 
 def _write_parquet(part: Path, output: Path, n: int) -> None:

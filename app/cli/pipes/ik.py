@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.cli.pipes.poses import INVALID, NOTHING, Counted, PoseTable, Target, Wrong, answered
+from app.cli.pipes.poses import INVALID, NOTHING, Counted, Goal, PoseTable, Wrong, answered
 from app.cli.pipes.sink import Sink, form_of, opened_sink
-from app.cli.pipes.source import Goal, opened_source
+from app.cli.pipes.source import opened_source
 from app.shared.answers.ik import IkAnswer, add_pendant, ik_answer
 from kin import IKOptions, InputError, Robot, Status
 from kin.ik import Task, solve
@@ -49,7 +49,7 @@ class RowsQuestion:
     def best(self, goals: list[Goal]) -> Iterator[tuple[str, Array, str]]:
         """Status, best solution ``(n,)`` and reason of each target."""
         for task, group in groupby(goals, lambda goal: goal.task):
-            targets = [Target(goal.place, *self._placed(goal)[::2]) for goal in group]
+            targets = [goal._replace(T=T, wrong=wrong) for goal in group for T, _, wrong in [self._placed(goal)]]
             found = answered(self.robot, targets, self.options(task, 1), self.q_seed, self.strict, self.pendant)
             yield from zip(found.status, found.q, found.reason, strict=True)
 
@@ -98,7 +98,7 @@ def solve_rows(question: RowsQuestion, source: str, output: str, form: str | Non
         some = next(pieces)  # what is wrong at once leaves no file
         with opened_sink(output, form_of(output, form, opened.form), heading) as sink:
             while some:
-                counts += Counter(_put(sink, question, some))
+                counts += Counter(_put(sink, question, [read() for read in some]))
                 some = next(pieces, [])
     return Counted(counts.total(), counts[Status.SOLVED], counts[INVALID])
 

@@ -10,8 +10,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.cli.pipes.columns import Columns
 from kin import IKOptions, InputError, Robot, Status, solve_ik_many
+from kin.ik import Task
 from kin.ik.problem import read_pose
 from kin.poses import FORMS, SI, PoseForm, form_named
 from kin.typed import EntryError
@@ -56,25 +56,10 @@ class PoseTable:
         except EntryError as error:
             raise InputError(field, list(numbers), f"{columns}. {error.detail}") from None
 
-    def target(self, numbers: Sequence[float], place: str) -> Target:
-        """The target of a row, or what is wrong with it."""
-        try:
-            return Target(place, self.pose(numbers, place))
-        except InputError as error:
-            return Target(place, NOTHING, Wrong.of(error))
-
     def rows(self, T: Array) -> list[list[float]]:
         """The numbers of poses ``(m, 4, 4)``."""
         scales = [unit.scale for unit in self.form.units_of(SI)]
         return [[v * scale for v, scale in zip(self.form.numbers(each), scales, strict=True)] for each in T]
-
-
-def target_of(row: Sequence[str], columns: Columns, table: PoseTable, place: str) -> Target:
-    """The target of the cells of a row, or what is wrong with it."""
-    try:
-        return table.target(columns.numbers(row, place), place)
-    except InputError as error:
-        return Target(place, NOTHING, Wrong.of(error))
 
 
 class Wrong(NamedTuple):
@@ -96,17 +81,21 @@ class Wrong(NamedTuple):
         return made.renamed(self.field)
 
 
-class Target(NamedTuple):
-    """A target of a row, or what is wrong with it.
+class Goal(NamedTuple):
+    """One target.
 
     Attributes:
         place: of the row, for a message: ``--targets line 3``.
-        T: pose ``(4, 4)``, not-a-number where there is none.
+        task: what its form implies, "pose" for tables and arrays.
+        T: in its frame ``(4, 4)``, as it was sent: its digits tell how closely it can be met.
+        frame: name of its frame; None: that of ``--frame``.
         wrong: what is wrong with the row, None for a target.
     """
 
     place: str
+    task: Task
     T: Array
+    frame: str | None = None
     wrong: Wrong | None = None
 
 
@@ -132,7 +121,7 @@ class Counted(NamedTuple):
 
 
 def answered(
-    robot: Robot, targets: Sequence[Target], options: IKOptions, q_seed: Array | None, strict: bool, pendant: bool
+    robot: Robot, targets: Sequence[Goal], options: IKOptions, q_seed: Array | None, strict: bool, pendant: bool
 ) -> Answers:
     """The answers to targets in the frame of the robot; `pendant`: with joint values as its pendant shows them.
 
@@ -166,7 +155,7 @@ def answered(
     return Answers(q, tuple(status), tuple(reason))
 
 
-def _wrong(target: Target, options: IKOptions) -> Wrong | None:
+def _wrong(target: Goal, options: IKOptions) -> Wrong | None:
     """What is wrong with a target that the core refuses."""
     try:
         read_pose(target.T, options.coordinates.code)

@@ -16,14 +16,14 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import dropwhile
 from pathlib import Path
-from typing import Any, BinaryIO, Literal, NamedTuple
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.cli.pipes.columns import Columns
 from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
-from app.cli.pipes.poses import NOTHING, PoseTable, Wrong
+from app.cli.pipes.poses import NOTHING, Goal, PoseTable, Wrong
 from kin import InputError, Robot
 from kin.ik import Task
 from kin.ik.problem import read_pose
@@ -34,30 +34,13 @@ from kin.transforms import frame_from_approach, pose_from_position_wxyz
 
 Array = NDArray[np.float64]
 Form = Literal["csv", "npy", "ndjson"]
+_Reads = list[tuple[str, Callable[[], list[float]]]]  # the place of each row, and what reads its numbers
 AT_ONCE = 4096  # rows of one piece
 LONGEST_LINE = 1 << 20
 _CHUNK = 1 << 16
 _NUMPY = b"\x93NUMPY"
-UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # as spreadsheets write “Unicode text”
+_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # as spreadsheets write “Unicode text”
 _EXAMPLE = '{"position": [0.4, 0.1, 0.3], "wxyz": [0, 1, 0, 0]}'
-
-
-class Goal(NamedTuple):
-    """One target.
-
-    Attributes:
-        place: of the row, for a message: ``--targets line 3``.
-        task: what its form implies, "pose" for tables and arrays.
-        T: in its frame ``(4, 4)``, as it was sent: its digits tell how closely it can be met.
-        frame: name of its frame; None: that of ``--frame``.
-        wrong: what is wrong with the row, None for a target.
-    """
-
-    place: str
-    task: Task
-    T: Array
-    frame: str | None = None
-    wrong: Wrong | None = None
 
 
 class Source:
@@ -66,10 +49,12 @@ class Source:
     Attributes:
         form: what they are written in; "csv" for any table, also of a Parquet file.
         field: the option that names them.
+
+    Of a file with a path, arrays and Parquet are read piece by piece.
     """
 
-    def __init__(self, file: BinaryIO, field: str) -> None:
-        self._file = file
+    def __init__(self, file: BinaryIO, field: str, path: Path | None = None) -> None:
+        self._file, self._path = file, path
         self._first = _read(file)
         while self._first and any(magic.startswith(self._first) for magic in (_NUMPY, MAGIC)):
             # A pipe may give single bytes.
@@ -77,7 +62,7 @@ class Source:
             if not more:
                 break
             self._first += more
-        if self._first.startswith(UTF16):
+        if self._first.startswith(_UTF16):
             text = (self._first + self._file.read()).decode("utf-16", "replace")
             self._first, self._file = text.encode(), io.BytesIO()
         self.field = field
@@ -114,26 +99,26 @@ class Source:
                     robot, [(place, partial(self._json, line, place)) for place, line in lines], shown
                 )
 
-    def goals(self, table: PoseTable, maker: str = "") -> Iterator[list[Goal]]:
-        """Targets, piece by piece; a row that is none says what is wrong with it.
+    def goals(self, table: PoseTable, maker: str = "", first: int = 0) -> Iterator[list[Callable[[], Goal]]]:
+        """What reads each target, piece by piece; a row that is none says what is wrong with it.
 
         A table has the columns of `table` among others, or nothing but these numbers in each row. A JSON line is a
         target of REST, or an answer with a `pose`.
 
         Args:
             maker: of the arm, which decides what a `text` with letters of several makers means.
+            first: how many rows of a table or an array are left out.
         """
         if self.form == "npy":
-            done = 0
-            for poses in self._arrays((4, 4), "an array of poses (k, 4, 4)"):
-                yield [Goal(f"{self.field}[{done + i}]", "pose", T) for i, T in enumerate(poses)]
-                done += len(poses)
+            for poses in self._arrays((4, 4), "an array of poses (k, 4, 4)", first):
+                yield [partial(Goal, f"{self.field}[{first + i}]", "pose", T) for i, T in enumerate(poses)]
+                first += len(poses)
         elif self.form == "csv":
-            for rows in self._table(table.names):
-                yield [_goal(place, partial(_row, table, place, numbers)) for place, numbers in rows]
+            for rows in self._table(table.names, first):
+                yield [partial(_goal, place, partial(_row, table, place, read)) for place, read in rows]
         else:
             for lines in self._lines():
-                yield [_goal(place, partial(self._line, place, line, maker)) for place, line in lines]
+                yield [partial(_goal, place, partial(self._line, place, line, maker)) for place, line in lines]
 
     def numbers(self, names: Sequence[str]) -> list[tuple[str, list[float]]]:
         """The rows of a table with these columns among others, or nothing but these numbers; each with its place.
@@ -226,11 +211,11 @@ class Source:
         except (ValueError, RecursionError) as error:
             raise InputError(field, line, f"a line of JSON ({error})") from None
 
-    def _table(self, names: Sequence[str]) -> Iterator[list[tuple[str, Callable[[], list[float]]]]]:
-        """The place of each row, and what reads its named numbers or raises `InputError`."""
+    def _table(self, names: Sequence[str], first: int = 0) -> Iterator[_Reads]:
+        """The rows from the first one on; what reads the named numbers of one may raise `InputError`."""
         if self._first.startswith(MAGIC):
-            for first, rows in self._parquet(names):
-                yield [(f"{self.field}[{first + i}]", partial(list, row)) for i, row in enumerate(rows)]
+            for start, rows in self._parquet(names, first):
+                yield [(f"{self.field}[{start + i}]", partial(list, row)) for i, row in enumerate(rows)]
             return
         columns: Columns | None = None
         done, separator = 0, ","
@@ -244,11 +229,10 @@ class Source:
             if columns is None:
                 columns = Columns.of(cells[0], names, self.field, "." if separator == "," else ",")
                 lines, cells = lines[columns.has_heading :], cells[columns.has_heading :]
-            some: list[tuple[str, Callable[[], list[float]]]] = [
-                (place, partial(columns.numbers, row, place)) for (place, _), row in zip(lines, cells, strict=True)
-            ]
-            if some:
-                yield some
+            pairs = zip(lines, cells, strict=True)
+            some: _Reads = [(place, partial(columns.numbers, row, place)) for (place, _), row in pairs]
+            if len(some) > first - done:
+                yield some[max(0, first - done) :]
             done += len(some)
         if not done:
             raise InputError(self.field, "a heading alone", "at least one row")
@@ -261,15 +245,15 @@ class Source:
             except csv.Error as error:
                 raise InputError(place, str(error), "a row of a table") from None
 
-    def _parquet(self, names: Sequence[str]) -> Iterator[tuple[int, list[list[float]]]]:
+    def _parquet(self, names: Sequence[str], first: int) -> Iterator[tuple[int, list[list[float]]]]:
         """The named numbers of each row of a Parquet file, and the place of the first row."""
-        file = io.BytesIO(self._first + self._file.read())
+        file = self._path or io.BytesIO(self._first + self._file.read())
         expected = "a Parquet file with the columns " + ", ".join(names)
         with opened_columns(file, names, self.field, expected) as table:
             if not table.metadata.num_rows:
                 raise InputError(self.field, "a Parquet file without rows", "at least one row")
-            for first, rows in rows_of(table, names, AT_ONCE, self.field, expected):
-                yield first, rows.tolist()
+            for start, rows in rows_of(table, names, AT_ONCE, self.field, expected, first):
+                yield start, rows.tolist()
 
     def _lines(self) -> Iterator[list[tuple[str, str]]]:
         """Lines as they arrive, without empty ones, each with its place."""
@@ -290,23 +274,26 @@ class Source:
             raise InputError(self.field, "nothing", "at least one row")
 
     def _text(self, line: bytes, place: str) -> str:
-        try:
-            return line.decode().removesuffix("\r")
+        try:  # in a table, a column that nobody asks for may be in another encoding
+            return line.decode(errors="replace" if self.form == "csv" else "strict").removesuffix("\r")
         except UnicodeDecodeError:
             raise InputError(place, line, "text in UTF-8") from None
 
-    def _arrays(self, shape: tuple[int, ...], expected: str) -> Iterator[Array]:
-        data = self._first + self._file.read()
+    def _arrays(self, shape: tuple[int, ...], expected: str, first: int = 0) -> Iterator[Array]:
         try:
-            found: Any = np.load(io.BytesIO(data), allow_pickle=False)
+            found: Any = (
+                np.load(self._path, mmap_mode="r", allow_pickle=False)
+                if self._path
+                else np.load(io.BytesIO(self._first + self._file.read()), allow_pickle=False)
+            )
         except (ValueError, EOFError):
             raise InputError(self.field, "a broken .npy file", expected) from None
         if found.ndim != len(shape) + 1 or found.shape[1:] != shape or found.dtype.kind not in "fiu":
             raise InputError(self.field, f"an array {found.shape} of {found.dtype}", expected)
         if not len(found):
             raise InputError(self.field, f"an array {found.shape}", "at least one row")
-        for start in range(0, len(found), AT_ONCE):
-            yield np.ascontiguousarray(found[start : start + AT_ONCE], dtype=np.float64)
+        for start in range(first, len(found), AT_ONCE):
+            yield np.array(found[start : start + AT_ONCE], dtype=np.float64, order="C")
 
 
 @contextmanager
@@ -320,7 +307,7 @@ def opened_source(path: str, field: str) -> Iterator[Source]:
             file = stack.enter_context(Path(path).open("rb"))
         except OSError as error:
             raise InputError(field, path, f"a file that can be read ({error.strerror})") from None
-        yield Source(file, field)
+        yield Source(file, field, Path(path) if file.seekable() else None)
 
 
 def _row(table: PoseTable, place: str, numbers: Callable[[], list[float]]) -> Goal:

@@ -16,10 +16,10 @@ import pytest
 import kin
 from app.cli import targets
 from app.cli.parser import main
+from app.cli.pipes import source
 from app.cli.pipes.poses import PoseTable
 
 COLUMNS = ["x", "y", "z", "qw", "qx", "qy", "qz"]
-WXYZ = PoseTable()
 
 
 def poses(count):
@@ -47,6 +47,7 @@ def wxyz(T):
 def small(monkeypatch):
     """Pieces of four targets."""
     monkeypatch.setattr(targets, "AT_ONCE", 4)
+    monkeypatch.setattr(source, "AT_ONCE", 4)
 
 
 @pytest.mark.usefixtures("small")
@@ -110,10 +111,9 @@ def test_a_parquet_file_gets_a_table_with_the_status_of_each(tmp_path, capsys):
 def test_a_parquet_file_is_read_from_any_row_on(tmp_path, first):
     T = poses(11)
     table(tmp_path / "in.parquet", T)
-    pieces = list(targets._pieces(tmp_path / "in.parquet", first, WXYZ))
-    assert all(len(each) <= 4 for each in pieces)
-    assert sum(map(len, pieces)) == 11 - first
-    assert not pieces or np.abs([each.T for piece in pieces for each in piece] - T[first:]).max() < 1e-12
+    found = [read().T for read in targets._targets(tmp_path / "in.parquet", first, PoseTable())]
+    assert len(found) == 11 - first
+    assert not found or np.abs(found - T[first:]).max() < 1e-12
 
 
 def test_without_the_extra_a_sentence_says_what_is_missing(tmp_path, monkeypatch, capsys):
@@ -132,7 +132,7 @@ def test_without_the_extra_a_sentence_says_what_is_missing(tmp_path, monkeypatch
 def test_what_is_no_parquet_file_of_targets_is_refused_by_name(tmp_path, capsys):
     source, out = tmp_path / "in.parquet", tmp_path / "out.npy"
     given = [
-        (b"no table", "a .npy file of poses"),
+        (b"no table", "a heading with the columns x, y, z"),
         ({"x": [1.0]}, "the columns x, y, z"),
         ({name: ["a"] for name in COLUMNS}, r"--targets\[0\]"),
         ({name: [0.5, 0.5, None] for name in COLUMNS}, r"--targets\[2\]"),
@@ -218,13 +218,14 @@ def test_an_interrupted_run_goes_on_where_it_ended(tmp_path, monkeypatch, ending
 @pytest.mark.parametrize(
     ("content", "words", "message"),
     [
-        (np.eye(3), [], "a .npy file of poses"),
-        (np.empty((0, 4, 4)), [], "at least one target"),
+        (np.eye(3), [], "an array of poses"),
+        (np.empty((0, 4, 4)), [], "at least one row"),
         (np.full((5, 4, 4), np.nan), [], r"--targets\[0\]"),
         (np.stack([np.eye(4)] * 5 + [np.zeros((4, 4))]), [], r"--targets\[5\]"),
         (np.eye(4)[None], ["--wxyz", "1", "0", "0", "0"], "no --wxyz: the file has the orientations"),
         (np.eye(4)[None], ["--frame", "tool"], "a frame that does not move"),
         ("a,b\n1,2\n", [], "the columns x, y, z"),
+        ("[]\n", [], "a .npy file of poses"),
         ("x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0\n", [], r"--targets line 2.*7 numbers"),
     ],
 )
