@@ -28,7 +28,7 @@ class SumsLesson(Lesson):
     about = "Learns to count."
 
     @staticmethod
-    def outline(robot, units):
+    def outline(robot, units, text=None):
         question = Choice("1 + 1?", (Option("2", "Counted.", True), Option("3", "One too many.")))
         steps = (
             Step("Two", f"At the {robot.name}.", question, "It is 2."),

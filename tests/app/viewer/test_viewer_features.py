@@ -88,7 +88,7 @@ class Pupil(Witness, Lesson):
     about = "Learns & reports."
 
     @staticmethod
-    def outline(robot, units):
+    def outline(robot, units, text=None):
         sum_ = Choice("1 + 1?", (Option("2", "Counted.", True), Option("3", "One too many.")))
         return Outline("You can count.", (Step("Sums", f"At the {robot.id}.", sum_, "It is 2."),), (sum_,))
 

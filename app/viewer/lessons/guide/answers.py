@@ -21,7 +21,7 @@ class Answers:
 
     def __init__(self, stage: Stage, lesson: type[Lesson]) -> None:
         self._stage, self._lesson = stage, lesson
-        self.arm = arm_for(stage.activity.text(lesson.key), stage.arm.now.robot)
+        self.arm = stage.arm.now.robot
         self.progress = Progress(self._outline())
         self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
         self._arms: dict[Robot, Progress] = {self.arm: self.progress}
@@ -45,17 +45,16 @@ class Answers:
 
     def ask_about(self, robot: Robot) -> None:
         """Go on with the questions about another arm that the file names, at the same step."""
-        at, before, self.arm = self.progress.at, self.progress.outline, robot
-        outline = self._outline()
-        self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
-        self.progress = self._arms.setdefault(robot, Progress(outline))
-        self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
-        self._use(outline)
-        self.progress.at = outline.step_like(before, at)
+        self.arm = robot
+        self._go_on(self._outline())
 
     def reword(self) -> None:
-        """The units have changed, or the words."""
-        self._use(self._outline())
+        """The units have changed, or the words, which may be about other arms."""
+        before, outline = self.arm, self._outline()
+        if self.arm == before:
+            self._use(outline)
+        else:
+            self._go_on(outline)
         self._ask_earlier()
 
     def choose_earlier(self) -> None:
@@ -104,6 +103,15 @@ class Answers:
         exercises = self._stage.activity.courses.exercises
         self.progress.ask_also(earlier.questions(self.drawn, exercises, self._stage.display.units))
 
+    def _go_on(self, outline: Outline) -> None:
+        """Go on at the same step of an outline for another arm."""
+        at, before = self.progress.at, self.progress.outline
+        self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
+        self.progress = self._arms.setdefault(self.arm, Progress(outline))
+        self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
+        self._use(outline)
+        self.progress.at = outline.step_like(before, at)
+
     def _use(self, outline: Outline) -> None:
         """Go on with an outline; with one of another text, as far as the answers fit its questions."""
         progress, before = self.progress, self.progress.outline.text
@@ -112,5 +120,8 @@ class Answers:
             progress.restore(progress.state())
 
     def _outline(self) -> Outline:
-        text = self._stage.activity.text(self._lesson.key)
-        return self._lesson.outline_in(self.arm, self._stage.display.units, text)
+        """For `arm`, or for another one if the words, which the operator may have changed, do not name that."""
+        stage, text = self._stage, self._stage.activity.text(self._lesson.key)
+        if arm_for(text, self.arm) != self.arm:
+            self.arm = arm_for(text, stage.arm.now.robot)
+        return self._lesson.outline_in(self.arm, stage.display.units, text)

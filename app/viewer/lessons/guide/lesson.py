@@ -110,8 +110,7 @@ class Lesson(Feature):
     @classmethod
     def asked(cls, robot: Robot, units: Units, text: LessonText | None = None) -> Outline:
         """The outline for an arm that the file names, with the steps that are asked about others."""
-        found = cls.outline(robot, units) if text is None else cls.outline(robot, units, text)
-        return cls.completed(found, robot, units)
+        return cls.completed(cls.outline(robot, units, text), robot, units)
 
     @classmethod
     def completed(cls, found: Outline, robot: Robot, units: Units) -> Outline:

@@ -150,3 +150,15 @@ def test_of_a_file_that_is_edited_the_answers_stay_that_fit_its_questions(folder
         press("go", value=0)
         tab.wait(lambda: 'data-question="1"' in tab.html)
         assert 'data-question="1" data-closed="1"' not in tab.html
+
+
+def test_a_file_that_no_longer_names_the_arm_asks_about_one_that_it_names(folder: Path, server: int) -> None:
+    data = tomllib.loads(lesson_files()["velocity"].read_text(encoding="utf-8"))
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        (folder / "velocity.toml").write_text(to_toml(data | {"arms": ["ur5"]}), encoding="utf-8")
+        tab.set("Radians", True)
+        tab.wait(lambda: "Ask this about UR5" in tab.html)
+        assert "Column i of the Jacobian is" in tab.html
