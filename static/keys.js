@@ -2,6 +2,7 @@
 // Runs in viser's page: what the keys do, as an overview that the key ? and a button in the tab View open. There, keys of
 // a single letter can also be switched off, for those who speak to their computer or press keys by accident. The choice
 // is kept in this browser.
+// A row with true is for those, too, who may only look.
 //
 // docs/teaching.md and docs/own-arm.md have the same list, which a test compares; input.js, drawer.js and robot.js act.
 (() => {
@@ -10,7 +11,7 @@
     ["Anywhere", [
       ["Ctrl+Z; Ctrl+Shift+Z or Ctrl+Y", "undo; redo"],
       ["Ctrl+K", "find a tab, lesson, exercise, arm or action by typing"],
-      ["?", "this overview"],
+      ["?", "this overview", true],
     ]],
     ["A joint's slider", [
       ["arrow keys; with Shift", "1°; 0.1° (0.01 and 0.001 rad; 1 and 0.1 mm)"],
@@ -35,9 +36,9 @@
       ["Alt with these", "turn about the axis by 5°, with Shift by 1°"],
       ["G", "switch the axes of keys and arrows: tool or base (also in the tab View)"],
       ["T", "type a target"],
-      ["B", "tabs Robot and Program: table, rows and plot below the scene over its whole width, and back"],
+      ["B", "tabs Robot and Program: table, rows and plot below the scene over its whole width, and back", true],
       ["Shift while dragging the arrows", "steps of 10 mm and 5°"],
-      ["W, A, S, D, Q, E, arrow keys", "move the camera"],
+      ["W, A, S, D, Q, E, arrow keys", "move the camera", true],
     ]],
   ];
   const CAP = /(Ctrl|Shift|Alt|Tab|Enter|Esc|PageUp|PageDown|Home|End|\b[A-Z]\b|[↑↓←→?])/;
@@ -80,8 +81,9 @@
     list.tabIndex = 0; // so that it can be scrolled without a mouse
     for (const [where, rows] of KEYS) {
       const table = element("table", element("caption", where));
-      for (const [keys, action] of rows) {
+      for (const [keys, action, looking] of rows) {
         const line = table.insertRow();
+        if (!looking) line.dataset.acts = "";
         line.append(element("th", ...drawn(keys)), element("td", action));
         line.firstChild.scope = "row";
       }
@@ -95,6 +97,7 @@
   }
   function open() {
     overview ??= build();
+    overview.toggleAttribute("data-only-looking", document.querySelector("[data-looking]") !== null);
     if (!overview.open) overview.showModal();
   }
 

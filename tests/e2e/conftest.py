@@ -9,6 +9,7 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -41,8 +42,21 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def address(data: Path) -> Iterator[str]:
     """The service as a user starts it, on a free port."""
-    env = {**os.environ, "PYTHONPATH": str(ROOT), "KINBOARD_DATA": str(data)}
-    env["KINBOARD_FRAME_ANCESTORS"] = "http://school.localhost:*"
+    with running(data, KINBOARD_FRAME_ANCESTORS="http://school.localhost:*") as url:
+        yield url
+
+
+@pytest.fixture
+def read_only_address(tmp_path: Path) -> Iterator[str]:
+    """A service at which visitors may only look."""
+    with running(tmp_path, KINBOARD_READ_ONLY="1") as url:
+        yield url
+
+
+@contextmanager
+def running(data: Path, **settings: str) -> Iterator[str]:
+    """A service with its folder for data, and other settings."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "KINBOARD_DATA": str(data), **settings}
     command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
     log = data / "service.log"
     with (

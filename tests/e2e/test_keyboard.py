@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page import Tab
-from playwright.sync_api import expect
+from page import BLIND, WAIT, Tab
+from playwright.sync_api import Browser, expect
 
 import kin
 
@@ -267,6 +267,20 @@ def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is
         expect(window.locator("#kb-keys")).to_be_hidden()
         expect(opener).to_be_focused()
         shown.open("Move")
+
+
+@pytest.mark.full
+def test_who_may_only_look_is_told_of_the_keys_that_work_then(browser: Browser, read_only_address: str) -> None:
+    page = browser.new_page()
+    page.add_init_script(BLIND)
+    page.goto(read_only_address + "viewer/")
+    expect(page.locator("[data-looking]")).to_be_attached(timeout=WAIT)
+    page.keyboard.press("?")
+    shown = page.get_by_role("dialog", name="Keys")
+    expect(shown).to_be_visible()
+    assert shown.locator("caption:visible").all_inner_texts() == ["Anywhere", "Scene"]
+    assert shown.locator("th:visible").all_text_contents() == ["?", "B", "W, A, S, D, Q, E, arrow keys"]
+    page.close()
 
 
 @pytest.mark.slow

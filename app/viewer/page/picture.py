@@ -82,7 +82,7 @@ class Picture:
             (x, y, metre), *line = self._camera.places(line).tolist()
             place = _numbers(x, y, metre * gizmo.scale if gizmo.visible else 0.0)
             arm = _numbers(metre * THICK * shown.size, *(value for point in line for value in point[:2]))
-        update_html(self._panel.hints, render("panel/hints", place=place, arm=arm))
+        update_html(self._panel.hints, render("panel/hints", place=place, arm=arm, looking=not wanted))
 
 
 def _numbers(*values: float) -> str:
