@@ -36,6 +36,7 @@ from app.shared.threads import NICENESS
 from kin import Robot, fk
 
 CANCEL: Final = b""  # the message that nobody waits for the present answer any more
+LOADED: Final = b""  # the first message of a process: it takes what it is asked
 _LENGTH = struct.Struct(">Q")
 
 
@@ -144,6 +145,7 @@ def main() -> None:
     fk(begin.robots[0], begin.robots[0].q_home)  # loads the kernels
     gc.freeze()
     MemoryKeeper(lambda: not _PROCESS.busy).start()
+    write(answers, LOADED)
     while True:
         job, deadline = _PROCESS.jobs.get()
         _PROCESS.busy = True

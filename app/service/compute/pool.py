@@ -19,6 +19,7 @@ import copyreg
 import io
 import pickle
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -38,7 +39,6 @@ Answer = Callable[[Deadline], T]
 
 GRACE = 0.4  # s for a computation to end after its client has left
 LATE = 5.0  # s for one whose time is over: a list of targets is answered in part, after the target that it is at
-TRIES = 3  # to start a process
 
 
 class Pool:
@@ -69,15 +69,8 @@ class Pool:
 
     def wait(self) -> None:
         """Wait until each process takes jobs; raises `LostError` if one does not. Any thread may call."""
-        job = self.message(bool, 3600.0)  # any answer will do
         for process in self.processes:
-            for left in reversed(range(TRIES)):
-                try:
-                    process.ask(Job(job))
-                    break
-                except LostError:
-                    if not left:
-                        raise
+            process.wait()
 
     async def run(self, answer: Answer[T], deadline: Deadline, took: Callable[[float], object] | None = None) -> T:
         """What `answer` returns in another process, or raises there. The caller has a slot for one of them.
@@ -89,7 +82,7 @@ class Pool:
         """
         deadline.check()
         process = self._free.popleft()
-        loop, job = asyncio.get_running_loop(), Job(b"")
+        loop, job = asyncio.get_running_loop(), Job(b"", over=time.monotonic() + deadline.left)
         self._jobs[job] = process
         timers = [loop.call_later(deadline.left + LATE, process.kill, job)]
 

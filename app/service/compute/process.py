@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import os
 import pickle
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import IO, Any
 
@@ -20,6 +22,8 @@ from app.service.compute.child import CANCEL, Failure, Head, read, write
 from app.shared.memory.answers import AnswerMemory, MemoryFullError
 
 APART = 1.0  # s between two starts of a process, at least
+LOADING = 60.0  # s for a process to load the core, for which it needs one to two, before it is killed
+LOOK = 0.1  # s between two looks whether a job that waits for its process is still wanted
 
 logger = logging.getLogger("kinboard.compute")
 
@@ -33,6 +37,7 @@ class Job:
     """What a process is asked for. `cancelled` is set by the event loop, the rest by the thread that asks."""
 
     message: bytes
+    over: float = math.inf  # when nobody waits any more for a process that takes it, by `time.monotonic`
     sent: bool = False
     cancelled: bool = False
     seconds: float = 0.0  # that the process took
@@ -56,6 +61,7 @@ class ComputeProcess:
         self.job: Job | None = None
         self.child: subprocess.Popen[bytes] | None = None
         self._started = -APART
+        self._loading: threading.Timer | None = None  # while it loads the core
         self._stopped = threading.Event()
 
     @property
@@ -66,12 +72,22 @@ class ComputeProcess:
 
     def start(self) -> None:
         """Start a process if there is none."""
-        with self._asking, contextlib.suppress(LostError):  # the next job tries again
-            self._running()
+        with contextlib.suppress(LostError):  # the next job tries again
+            self.wait()
+
+    def wait(self) -> None:
+        """Wait until a process takes jobs, started if there is none; raises `LostError` if it does not."""
+        with self._asking:
+            running = self._running()
+            try:
+                self._load(running)
+            except (OSError, EOFError):
+                self._bury(running, expected=False)
+                raise LostError from None
 
     def ask(self, job: Job, memory: AnswerMemory | None = None) -> Any:
         """Wait for the answer to a job; raises what the process raises, `LostError`, or 503 if memory is full."""
-        with self._asking:
+        with self._turn(job):
             running = self._running()
             if job.cancelled:  # while the process was started
                 raise LostError
@@ -84,6 +100,7 @@ class ComputeProcess:
                     job.sent = True
                     if job.cancelled:
                         write(running.stdin, CANCEL)
+                self._load(running)
                 return self._answer(running.stdout, memory)
             except (OSError, EOFError):
                 self._bury(running, expected=job.cancelled)
@@ -121,6 +138,24 @@ class ComputeProcess:
                 self._bury(running, expected=True)
             self._asking.release()
 
+    @contextlib.contextmanager
+    def _turn(self, job: Job) -> Iterator[None]:
+        """The right to ask; raises `LostError` if nobody waits any more before the process has loaded the core."""
+        while not self._asking.acquire(timeout=LOOK):
+            if job.cancelled or time.monotonic() > job.over:
+                raise LostError
+        try:
+            yield
+        finally:
+            self._asking.release()
+
+    def _load(self, running: subprocess.Popen[bytes]) -> None:
+        """Wait until a process has loaded the core, if it does that."""
+        if self._loading is not None:
+            read(running.stdout)
+            self._loading.cancel()
+            self._loading = None
+
     def _answer(self, answers: IO[bytes] | None, memory: AnswerMemory | None) -> Any:
         found = pickle.loads(read(answers))
         if isinstance(found, Failure):
@@ -153,6 +188,9 @@ class ComputeProcess:
             if self._stopped.is_set():
                 raise LostError
             started = self.child = start_process(f"from {child.__name__} import main; main()")
+        self._loading = threading.Timer(LOADING, _end_loading, (started,))
+        self._loading.daemon = True
+        self._loading.start()
         try:
             write(started.stdin, self._begin)
         except OSError:
@@ -161,6 +199,9 @@ class ComputeProcess:
         return started
 
     def _bury(self, ended: subprocess.Popen[bytes], expected: bool) -> None:
+        if self._loading is not None:
+            self._loading.cancel()
+            self._loading = None
         with self._lock:
             self.child = None
             silent = expected or self._stopped.is_set()
@@ -178,6 +219,12 @@ def start_process(program: str) -> subprocess.Popen[bytes]:
         stdout=subprocess.PIPE,
         start_new_session=True,
     )
+
+
+def _end_loading(child: subprocess.Popen[bytes]) -> None:
+    """Kill a process that loads for too long: the thread that waits for it sees that."""
+    logger.error("a process that computes has not loaded the core within %g s, and is killed", LOADING)
+    child.kill()
 
 
 def _kill(child: subprocess.Popen[bytes]) -> int:

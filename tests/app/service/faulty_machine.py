@@ -58,7 +58,7 @@ ASKED = (
 )
 # Of every Python of the machine. The end of a terminal ends the service, also where these tests run without one.
 STARTUP = """
-import os, signal, time
+import os, signal, sys, time
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 signal.signal(signal.SIGUSR1, lambda *_: time.sleep(600))
 _true = time.time
@@ -68,6 +68,8 @@ def _time():
         return _true() + float(file.read())
 
 time.time = _time
+if "app.service.compute" in " ".join(sys.orig_argv) and os.path.exists(os.environ["FAULTY_LOADING"]):
+    time.sleep(600)
 """
 MOUNT = """
 for folder in "$FAULTY_FOLDERS"/*/ /dev/shm; do
@@ -95,6 +97,7 @@ class Machine:
     Attributes:
         folders: where its folders are, as the service sees them: temp, data and those of `SEEDS`.
         platforms: addresses of learning platforms, by the manner in which they misbehave.
+        loading: a file; while it is there, processes that compute hang before they have loaded the core.
         cookie: of a student in a room.
         confirmed: how many of the student's answers were confirmed.
     """
@@ -102,6 +105,7 @@ class Machine:
     service: Victim
     folders: Path
     clock: Path
+    loading: Path
     mounted: bool
     platforms: dict[str, str]
     cookie: str = ""
@@ -180,6 +184,19 @@ class Machine:
         """Let the service's clock be wrong by so much."""
         self.clock.write_text(str(seconds))
         self._undo.append(lambda: self.clock.write_text("0"))
+
+    # The core
+
+    def hang_loading(self) -> None:
+        """Let processes that compute hang before they have loaded the core."""
+        self.loading.touch()
+        self._undo.append(self.loading.unlink)
+
+    def computes(self) -> bool:
+        """Whether a request is answered that a process computes."""
+        method, path, body = ASKED[1]
+        url = f"{self.service.url}{path}"
+        return httpx2.request(method, url, json=body, trust_env=False, timeout=PATIENCE).status_code == 200
 
     def mend(self) -> None:
         """Undo what was done."""
@@ -296,7 +313,7 @@ def seed(folder: Path) -> None:
 @contextmanager
 def running_machine(base: Path) -> Iterator[Machine]:
     """A service with folders and a clock of its own, and a student in a room."""
-    folders, clock, seeds = base / "folders", base / "clock", base / "seeds"
+    folders, clock, loading, seeds = (base / name for name in ("folders", "clock", "loading", "seeds"))
     seed(seeds)
     clock.write_text("0")
     (base / "code").mkdir()
@@ -309,6 +326,7 @@ def running_machine(base: Path) -> Iterator[Machine]:
     environment = {
         "PYTHONPATH": os.pathsep.join((str(base / "code"), str(ROOT))),
         "FAULTY_CLOCK": str(clock),
+        "FAULTY_LOADING": str(loading),
         "FAULTY_FOLDERS": str(folders),
         "FAULTY_SEEDS": str(seeds),
         "FAULTY_SIZE": str(MOST),
@@ -323,7 +341,7 @@ def running_machine(base: Path) -> Iterator[Machine]:
         platforms(base) as (file, addresses),
         victim(True, before=before, KINBOARD_LTI=str(file), **environment) as service,
     ):
-        yield Machine(service, folders, clock, mounted, addresses)
+        yield Machine(service, folders, clock, loading, mounted, addresses)
 
 
 def strain() -> float:

@@ -40,6 +40,7 @@ from faulty_machine import (
 )
 from live_server import wait_for
 
+from app.service.compute.process import LOADING
 from app.shared.settings import Settings
 
 REST = 5.0  # s
@@ -104,6 +105,15 @@ def and_replace_all(act: Callable[[Machine], object]) -> Act:
     return then
 
 
+def hang_loading(on: Machine, stack: ExitStack) -> None:
+    """The next process that computes hangs while it loads the core, until it is killed; another one does not."""
+    on.hang_loading()
+    send("compute", signal.SIGKILL)(on, stack)
+    wait_for(lambda: any("has not loaded the core" in line for line in on.service.errors), LOADING + PATIENCE)
+    on.mend()
+    wait_for(on.computes, PATIENCE)
+
+
 def clients(manner: str, first: bytes, lie: bytes) -> Act:
     def act(on: Machine, stack: ExitStack) -> None:
         stack.enter_context(misbehave(on.service, manner, first, lie))
@@ -145,6 +155,9 @@ PROCESSES = [
     for name in names
 ]
 
+# A request that waits for it ends with its time, which is less.
+LOADS = [Fault("loading", "hangs", hang_loading, late=LOADING + SILENCE)]
+
 FOLDERS = [
     Fault(
         name,
@@ -182,7 +195,7 @@ PEERS = [
     )
 ]
 
-TABLE = [*PROCESSES, *FOLDERS, *CLOCKS, *PEERS]
+TABLE = [*PROCESSES, *LOADS, *FOLDERS, *CLOCKS, *PEERS]
 
 
 # -- what must hold --------------------------------------------------------------------------------------------
@@ -261,6 +274,7 @@ DECLARED = {
         ),
         "app/service/compute/process.py": (
             "compute",
+            "loading",
             "app/service/compute/test_pool.py::test_a_process_that_ends_loses_one_request",
         ),
         "kin/codegen/extension/build.py": (

@@ -100,6 +100,8 @@ def stand_in() -> None:
         return requests.read(LENGTH.unpack(head)[0]) if head else sys.exit()
 
     read()
+    answers.write(LENGTH.pack(0))
+    answers.flush()
     while True:
         message = read()
         if message:

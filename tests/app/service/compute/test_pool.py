@@ -16,15 +16,18 @@ from typing import Any
 import pool_jobs
 import psutil
 import pytest
+from fastapi.testclient import TestClient
 from live_server import wait_for
 from starlette.requests import Request
 
 import kin
 from app.api.problems import ClientLeftError, ProblemError
 from app.api.work import ComputeSlots, Deadline, TooSlowError
+from app.service import startup
 from app.service.compute import pool as module
 from app.service.compute import process
 from app.service.compute.pool import Pool
+from app.service.main import create_app
 from app.shared.memory.answers import AnswerMemory
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -233,6 +236,36 @@ def test_each_process_is_waited_for_and_one_that_does_not_start_is_an_error(stan
     monkeypatch.setattr(pool_jobs, "STAND_IN", "raise SystemExit(1)")
     with pytest.raises(module.LostError):
         stand_ins().wait()
+
+
+def test_one_that_hangs_while_it_loads_is_killed_and_the_service_is_ready_with_another(
+    stand_ins, monkeypatch, caplog
+):
+    works = pool_jobs.STAND_IN
+    monkeypatch.setattr(pool_jobs, "STAND_IN", "import time; time.sleep(60)")
+    monkeypatch.setattr(process, "LOADING", 0.3)
+    monkeypatch.setattr(startup, "AGAIN", 0.1)
+    with TestClient(create_app(SETTINGS, STORE, pool=stand_ins())) as client:
+        wait_for(lambda: client.get("/readyz").json()["status"] == "failed", 60)
+        assert "has not loaded the core within 0.3 s, and is killed" in caplog.text
+        monkeypatch.setattr(process, "LOADING", 60.0)
+        monkeypatch.setattr(pool_jobs, "STAND_IN", works)
+        wait_for(lambda: client.get("/readyz").json()["status"] == "ready", 60)
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_request_waits_for_a_process_that_loads_no_longer_than_its_time_and_client(
+    stand_ins, monkeypatch, leaves
+):
+    monkeypatch.setattr(pool_jobs, "STAND_IN", "import time; time.sleep(60)")
+    pool = stand_ins()
+    pool.start()
+    wait_for(lambda: pool.processes[0].pid is not None)
+    loading, began = pool.processes[0].pid, time.monotonic()
+    with pytest.raises(ClientLeftError if leaves else TooSlowError):
+        ask(pool, pool_jobs.pid, seconds=60.0 if leaves else 0.1, leave=lambda: leaves)
+    assert time.monotonic() - began < module.LATE
+    assert pool.processes[0].pid == loading, "others may wait for it"
 
 
 def test_a_stop_does_not_wait_until_a_process_may_be_started_again(stand_ins, monkeypatch, caplog):
