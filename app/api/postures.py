@@ -15,7 +15,7 @@ from app.api.schemas import POST_REFUSALS, Body, Configuration, OneOf, Vector3, 
 from app.api.work import Deadline, computed
 from app.api.workspace.query import RegionQuery
 from app.exports.postures import FORMATS
-from app.shared.answers.postures import CuspidalAnswer, PostureMapAnswer, cuspidal_answer, posture_map_answer
+from app.shared.answers.postures import CuspidalAnswer, PostureMapAnswer
 from kin import JointConstraints, Robot, cuspidal, posture_map
 from kin.postures.verdicts import MOST_SEED, POSES
 
@@ -58,7 +58,7 @@ async def is_cuspidal(request: Request, robot: Robot, query: CuspidalQuery) -> R
 
 def _cuspidal(robot: Robot, constraints: JointConstraints, poses: int, seed: int, deadline: Deadline) -> Response:
     found = cuspidal(robot, constraints=constraints, poses=poses, seed=seed, cancel=deadline.check)
-    return reply(cuspidal_answer(found))
+    return reply(CuspidalAnswer.of(found))
 
 
 MAP_EXAMPLES = {
@@ -131,7 +131,7 @@ def _map(robot: Robot, body: PostureMapRequest, deadline: Deadline) -> Response:
     pose = None if body.target is None else body.target.in_world("pose", "target", robot.maker)[1]
     found = posture_map(robot, pose, cancel=deadline.check, **body.keywords)
     if body.format == "json":
-        return reply(posture_map_answer(found))
+        return reply(PostureMapAnswer.of(found))
     kind = FORMATS[body.format]
     name = f'attachment; filename="{robot.id}-postures.{kind.name}"'
     return Response(kind.write(found), media_type=kind.media_type, headers={"content-disposition": name})

@@ -16,7 +16,7 @@ from app.cli.files import write_file
 from app.cli.pipes.source import opened_source
 from app.cli.terminal import Notation, mounted_robot_of, pose_of, print_json, quantity, table, units_of
 from app.exports.touch import as_own, report, sheet_svg
-from app.shared.answers.calibration import calibration_answer, touch_plan_answer
+from app.shared.answers.calibration import CalibrationAnswer, TouchPlanAnswer
 from kin import InputError, Robot, robot_to_toml
 from kin.calibration import (
     Calibration,
@@ -161,7 +161,7 @@ def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
     if arguments.output is not None:
         write_file(arguments.output, text.getvalue())
     if arguments.json:
-        return print_json(touch_plan_answer(plan))
+        return print_json(TouchPlanAnswer.of(plan))
     notation = Notation(robot, arguments.rad)
     print(plan.text)
     for b, T in enumerate(plan.places):
@@ -188,7 +188,7 @@ def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
     if arguments.html is not None:
         write_file(arguments.html, report(found, sockets.astype(int).tolist()))
     if arguments.json:
-        print_json(calibration_answer(found))
+        print_json(CalibrationAnswer.of(found))
     else:
         print(found.text)
         seen = [error for error in found.errors if error.seen]

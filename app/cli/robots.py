@@ -24,7 +24,7 @@ from app.cli.terminal import (
     units_of,
 )
 from app.shared.answers.comparison import comparison_answer
-from app.shared.answers.motors import motor_match_answer
+from app.shared.answers.motors import MotorMatchAnswer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from app.shared.finding import find_robots
 from kin import InputError, Robot, compare, robot_to_toml
@@ -118,7 +118,7 @@ def run_motors(arguments: Namespace) -> int:
     if arguments.output is not None:
         write_file(arguments.output, robot_to_toml(replace(robot, motors=found.motors)))
     if arguments.json:
-        print_json(motor_match_answer(found))
+        print_json(MotorMatchAnswer.of(found))
     else:
         print("\n".join(finding.text for finding in found.findings))
     return 0 if found.complete else 1

@@ -27,7 +27,7 @@ from app.exports.formats import FORMATS
 from app.exports.picture import draw
 from app.exports.progress import progress_bar
 from app.exports.save import opened, reading, save
-from app.shared.answers.postures import cuspidal_answer, posture_map_answer
+from app.shared.answers.postures import CuspidalAnswer, PostureMapAnswer
 from app.shared.answers.workspace import workspace_answer
 from app.shared.clouds import Cloud
 from kin import InputError, JointConstraints, Robot, cuspidal, posture_map
@@ -171,7 +171,7 @@ def run_cuspidal(arguments: Namespace) -> int:
             robot, constraints=constraints, poses=arguments.poses, seed=arguments.seed, progress=progress
         )
     if arguments.json:
-        return print_json(cuspidal_answer(found))
+        return print_json(CuspidalAnswer.of(found))
     print(f"{robot.name} ({robot.id})\n\n{found.reason}")
     if found.loop is not None:
         units = Notation(robot, arguments.rad)
@@ -215,7 +215,7 @@ def run_postures(arguments: Namespace) -> int:
         except OSError as error:
             raise InputError("--output", arguments.output, f"a file that can be written ({error})") from None
     if arguments.json:
-        return print_json(posture_map_answer(found))
+        return print_json(PostureMapAnswer.of(found))
     print(f"{robot.name} ({robot.id})\n\n{found.explain(units)}")
     return 0
 

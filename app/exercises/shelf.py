@@ -33,7 +33,7 @@ MOST_FILES = 500  # in the folder: with more, pages save no further ones
 _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")  # Windows takes a file of this name for a device
 
 log = logging.getLogger("kinboard.exercises")
-_reading = threading.RLock()  # of the folders; not an attribute, because processes are sent the exercises
+_reading = threading.RLock()  # of the folders
 
 
 class _Stamp(NamedTuple):

@@ -15,12 +15,7 @@ from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, Configuration, as_configurations, example, numbers, reply, settings_of
 from app.api.work import Deadline, computed
-from app.shared.answers.calibration import (
-    CalibrationAnswer,
-    TouchPlanAnswer,
-    calibration_answer,
-    touch_plan_answer,
-)
+from app.shared.answers.calibration import CalibrationAnswer, TouchPlanAnswer
 from kin import InputError, Robot
 from kin.calibration import (
     MOST_TOUCHES,
@@ -185,7 +180,7 @@ def _planned(robot: Robot, body: PosturesRequest, done: Touches | None, deadline
     except InputError as error:
         part = {"done[0]": "done.q", "done[1]": "done.sockets"}.get(error.field[:7])
         raise (error if part is None else error.renamed(part + error.field[7:])) from None
-    return reply(touch_plan_answer(plan))
+    return reply(TouchPlanAnswer.of(plan))
 
 
 @operation(
@@ -204,7 +199,7 @@ async def calibrate_by_touching(request: Request, robot: Robot, body: CalibrateR
 
 def _calibrated(robot: Robot, q: Array, body: CalibrateRequest, deadline: Deadline) -> Response:
     found = calibrate(robot, q, body.sockets, **body.asked(robot), cancel=deadline.check)
-    return reply(calibration_answer(found))
+    return reply(CalibrationAnswer.of(found))
 
 
 def _read(request: Request, robot: Robot, body: TouchesBody, field: str) -> Array:

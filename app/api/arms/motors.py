@@ -15,7 +15,7 @@ from app.api.body import versioned
 from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, Configuration, as_configurations, example, reply, settings_of
 from app.api.work import Deadline, computed
-from app.shared.answers.motors import MotorMatchAnswer, motor_match_answer
+from app.shared.answers.motors import MotorMatchAnswer
 from app.shared.problems import from_input_error
 from kin import Robot, RobotFileError, robot_from_dict, robot_to_dict
 from kin.motors import Motor, match_motors
@@ -92,7 +92,7 @@ def _matched(
     options: dict[str, float],
     _: Deadline,
 ) -> Response:
-    return reply(motor_match_answer(match_motors(robot, poses, readings, motors, **options)))
+    return reply(MotorMatchAnswer.of(match_motors(robot, poses, readings, motors, **options)))
 
 
 def _motors_of(robot: Robot, described: list[dict[str, Any]]) -> tuple[Motor, ...]:

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.fk import Matrix
 from kin import robot_to_dict
-from kin.calibration import Calibration, TouchPlan
 
 
 class ExpectedErrorAnswer(Answer):
@@ -121,13 +120,3 @@ class CalibrationAnswer(Answer):
     """What would help; empty if nothing is known that would."""
     robot: Annotated[dict[str, Any], From(lambda found: robot_to_dict(found.robot))]
     """The arm with its own table, as the fields of a robot file."""
-
-
-def touch_plan_answer(plan: TouchPlan) -> TouchPlanAnswer:
-    """What `kin.calibration.touch_postures` has found."""
-    return TouchPlanAnswer.of(plan)
-
-
-def calibration_answer(found: Calibration) -> CalibrationAnswer:
-    """What `kin.calibration.calibrate` has found."""
-    return CalibrationAnswer.of(found)

@@ -7,7 +7,6 @@ from typing import Annotated
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.robots import MotorAnswer
 from kin.motor import MotorUnit
-from kin.motors import MotorMatch
 from kin.motors.findings import MotorCause, MotorStatus
 
 
@@ -47,8 +46,3 @@ class MotorMatchAnswer(Answer):
     """One of each motor that moves a joint, in their order."""
     motors: list[MotorAnswer]
     """All motors, those that match with their sign and zero."""
-
-
-def motor_match_answer(found: MotorMatch) -> MotorMatchAnswer:
-    """What `kin.motors.match_motors` has found."""
-    return MotorMatchAnswer.of(found)

@@ -6,7 +6,6 @@ from typing import Annotated
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.fk import Matrix
-from kin.postures import Cuspidality, PostureMap
 from kin.postures.maps import Kind
 from kin.postures.verdicts import Evidence, Verdict
 
@@ -36,11 +35,6 @@ class CuspidalAnswer(Answer):
     """Of the search: the same seed finds the same loop."""
     reason: str
     """All of it in a sentence for people."""
-
-
-def cuspidal_answer(found: Cuspidality) -> CuspidalAnswer:
-    """A verdict by `kin.cuspidal`."""
-    return CuspidalAnswer.of(found)
 
 
 class PostureCurveAnswer(Answer):
@@ -102,8 +96,3 @@ class PostureMapAnswer(Answer):
     """Number of nodes with an odd number of postures without limits: one may be missing, or two have merged."""
     reason: str
     """The regions in words, for people."""
-
-
-def posture_map_answer(found: PostureMap) -> PostureMapAnswer:
-    """A map by `kin.posture_map`."""
-    return PostureMapAnswer.of(found)

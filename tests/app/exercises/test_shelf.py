@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import pickle
 import shutil
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
@@ -205,15 +204,6 @@ def test_a_folder_that_goes_away_takes_nothing_with_it(folder: Path, no_pause: N
     assert titled(known) == ["Mine"]
     known.save(text("again", title="Again"))
     assert sorted(titled(known)) == ["Again", "Mine"]
-
-
-def test_a_service_sends_its_exercises_to_processes_that_do_not_begin_as_copies(folder: Path) -> None:
-    known = Exercises(folder)
-    known.save(text())
-    sent = pickle.loads(pickle.dumps(known))
-    assert titled(sent) == ["Mine"]
-    known.save(text("more"))
-    assert sent.get("more") is not None
 
 
 def own(name: str, title: str) -> Exercise:
