@@ -13,6 +13,7 @@ import httpx2
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import wait_for
 
 import kin
 
@@ -34,9 +35,10 @@ def test_kernels_are_compiled_before_the_service_answers_and_a_program_then_has_
             found = re.search(r":(\d+)/", process.stdout.readline())
             assert found
             ((path, body),) = EXAMPLE.findall(README)
-            url = f"http://127.0.0.1:{found[1]}{path}"
-            answer = httpx2.post(url, json=json.loads(body), trust_env=False, timeout=10)
+            url = f"http://127.0.0.1:{found[1]}"
+            answer = httpx2.post(f"{url}{path}", json=json.loads(body), trust_env=False, timeout=10)
             assert (answer.status_code, answer.json()["status"]) == (200, "solved"), answer.text
+            wait_for(lambda: httpx2.get(f"{url}/viewer/", trust_env=False, timeout=10).status_code == 200, 120)
             with FakeBrowser(int(found[1])) as tab:
                 tab.set("Robot", UR5.name)
                 tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(UR5, UR5.q_home)))
@@ -45,6 +47,6 @@ def test_kernels_are_compiled_before_the_service_answers_and_a_program_then_has_
             process.wait(30)
     code = README.split("```python\n")[1].split("```")[0]
     command = [sys.executable, "-c", code]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=20, check=True)
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60, check=True)
     count = len(kin.solve_ik(UR5, kin.fk(UR5, UR5.q_home), q_seed=UR5.q_home).solutions)
     assert (done.stdout.split()[0], done.stdout.count("["), done.stderr) == ("solved", count, "")
