@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.cli.files import write_file
+from app.cli.pipes.sink import write_output
 from app.cli.pipes.source import opened_source
 from app.cli.terminal import Notation, mounted_robot_of, pose_of, print_json, quantity, table, units_of
 from app.exports.touch import as_own, report, sheet_svg
@@ -49,7 +49,7 @@ def run(arguments: Namespace) -> int:
     if arguments.print is not None:
         if arguments.sheet is None:
             raise InputError("--print", arguments.print, "with --sheet: other boards are not printed on paper")
-        write_file(arguments.print, sheet_svg(arguments.sheet))
+        write_output(arguments.print, sheet_svg(arguments.sheet), "--print")
     given = _touches(robot, arguments.touches) if arguments.touches is not None else None
     noise = TouchNoise.of(robot)
     if arguments.noise is not None:
@@ -159,7 +159,7 @@ def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
     rows.writerow(_columns(robot))
     rows.writerows([socket + 1, *q] for socket, q in zip(plan.sockets.tolist(), plan.q.tolist(), strict=True))
     if arguments.output is not None:
-        write_file(arguments.output, text.getvalue())
+        write_output(arguments.output, text.getvalue())
     if arguments.json:
         return print_json(TouchPlanAnswer.of(plan))
     notation = Notation(robot, arguments.rad)
@@ -184,9 +184,9 @@ def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
     """Print what was found, and write the arm and the report."""
     found = replace(found, robot=as_own(found.robot))
     if arguments.output is not None:
-        write_file(arguments.output, robot_to_toml(found.robot))
+        write_output(arguments.output, robot_to_toml(found.robot))
     if arguments.html is not None:
-        write_file(arguments.html, report(found, sockets.astype(int).tolist()))
+        write_output(arguments.html, report(found, sockets.astype(int).tolist()), "--html")
     if arguments.json:
         print_json(CalibrationAnswer.of(found))
     else:

@@ -13,6 +13,7 @@ from pathlib import Path
 import kin
 from app.cli.bodies import MeshesBeside, MeshFilesBeside
 from app.cli.classroom.courses import check_course
+from app.cli.pipes.sink import write_output
 from app.cli.terminal import Notation, print_json, robot_of, table
 from app.cli.xacro import expanded, is_xacro
 from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
@@ -37,7 +38,7 @@ def run_import(arguments: Namespace) -> int:
     found = _read(arguments)
     text = robot_to_toml(found.robot)
     if arguments.output is not None:
-        write_file(arguments.output, text)
+        write_output(arguments.output, text)
     if arguments.json:
         return print_json(import_answer(found))
     if arguments.output is None:
@@ -70,11 +71,10 @@ def source_of(arguments: Namespace) -> Path | str:
 def run_export(arguments: Namespace) -> int:
     """Print or write an arm in a format."""
     text = robot_file(robot_of(arguments), arguments.format)
-    if arguments.output is None:
-        print(text, end="")
-    else:
-        write_file(arguments.output, text)
-        print(f"{arguments.output}: {len(text.encode())} bytes")
+    file = arguments.output or "-"
+    write_output(file, text)
+    if file != "-":
+        print(f"{file}: {len(text.encode())} bytes")
     return 0
 
 
@@ -83,10 +83,8 @@ def run_code(arguments: Namespace) -> int:
     robot, language, name = robot_of(arguments), arguments.language, arguments.name
     text = kin.generate(robot, language, name=name, closest=not arguments.no_closest)
     file = arguments.output or file_name(robot, language, name)
-    if file == "-":
-        print(text, end="")
-    else:
-        write_file(file, text)
+    write_output(file, text)
+    if file != "-":
         print(f"{file}: {len(text.encode()) / 1000:.0f} kB; its first lines say how to use it")
     return 0
 
@@ -105,14 +103,6 @@ def report_lines(report: UrdfReport) -> list[str]:
     if report.tilts:
         lines.append(f"fixed rows  {', '.join(report.tilts)}: between almost parallel axes")
     return [*lines, f"bodies      {report.about_bodies}", *(f"note: {note}" for note in report.notes)]
-
-
-def write_file(path: str, text: str) -> None:
-    """Write a text; raises `InputError` where that cannot be done."""
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError("--output", path, f"a file that can be written ({error.strerror})") from None
 
 
 def run_check(arguments: Namespace) -> int:
@@ -248,7 +238,7 @@ def run_doctor(arguments: Namespace) -> int:
     if arguments.mend is not None:
         found = examined(_chosen(found, arguments.mend))
     if arguments.output is not None and found.mended is not None:
-        write_file(arguments.output, found.mended)
+        write_output(arguments.output, found.mended)
     if arguments.json:
         print_json(examination_answer(found))
     else:

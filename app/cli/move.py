@@ -7,7 +7,7 @@ from argparse import Namespace
 from contextlib import closing
 from pathlib import Path
 
-from app.cli.pipes.sink import opened_output, opened_sink
+from app.cli.pipes.sink import opened_output, opened_sink, write_output
 from app.cli.pipes.source import opened_source
 from app.cli.terminal import (
     Notation,
@@ -18,6 +18,7 @@ from app.cli.terminal import (
     print_json,
     quantity,
     table,
+    text_of,
     units_of,
     workpieces_of,
 )
@@ -51,7 +52,7 @@ def run(arguments: Namespace) -> int:
         raise InputError("--picture", arguments.picture, "a name that ends in .svg")
     motion = _planned(
         robot,
-        parse_program(_text(arguments.program), robot, workpieces_of(arguments)),
+        parse_program(text_of(arguments.program, "PROGRAM"), robot, workpieces_of(arguments)),
         _start(robot, arguments),
         arguments,
     )
@@ -112,17 +113,7 @@ def _write_files(arguments: Namespace, motion: Motion, kind: MotionFormat | None
     if arguments.output is not None and kind is not None:
         _write(arguments.output, motion, kind, rate, arguments.json)
     if arguments.picture is not None:
-        try:
-            Path(arguments.picture).write_text(motion_plot(motion), encoding="utf-8")
-        except OSError as error:
-            raise InputError("--picture", arguments.picture, f"a file that can be written ({error})") from None
-
-
-def _text(path: str) -> str:
-    try:
-        return sys.stdin.read() if path == "-" else Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError("PROGRAM", path, f"a readable text file ({error})") from None
+        write_output(arguments.picture, motion_plot(motion), "--picture")
 
 
 def _format(arguments: Namespace) -> MotionFormat | None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
 
-from app.cli.pipes.sink import opened_output
-from app.cli.terminal import configuration, mounted_robot_of, obstacles_of, pose_of, print_json, units_of
+from app.cli.pipes.sink import write_output
+from app.cli.terminal import configuration, mounted_robot_of, obstacles_of, pose_of, print_json, text_of, units_of
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.takehome.page import SavedArm, web_page
-from kin import IKOptions, InputError, Obstacle, Robot, plan_motion
+from kin import IKOptions, Obstacle, Robot, plan_motion
 from kin.motion import Motion, parse_program
 from kin.transforms import Array
 
@@ -26,8 +25,7 @@ def run(arguments: Namespace) -> int:
     page = web_page(saved)
     file = arguments.output or f"{robot.id}.html"
     data = page.encode()
-    with opened_output(file) as written:
-        written.write(data)
+    write_output(file, data)
     if file != "-":
         if arguments.json:
             print_json({"file": file, "bytes": len(data)})
@@ -37,8 +35,5 @@ def run(arguments: Namespace) -> int:
 
 
 def _motion(robot: Robot, path: str, q_start: Array, obstacles: tuple[Obstacle, ...]) -> Motion:
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError("--program", path, f"a program that can be read ({error})") from None
-    return plan_motion(robot, parse_program(text, robot), q_start, obstacles=obstacles)
+    program = parse_program(text_of(path, "--program"), robot)
+    return plan_motion(robot, program, q_start, obstacles=obstacles)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.cli.files import write_file
+from app.cli.pipes.sink import write_output
 from app.cli.terminal import (
     Notation,
     clean,
@@ -116,7 +116,7 @@ def run_motors(arguments: Namespace) -> int:
         )
     found = match_motors(robot, given or motor_poses(robot)[: len(readings)], readings)
     if arguments.output is not None:
-        write_file(arguments.output, robot_to_toml(replace(robot, motors=found.motors)))
+        write_output(arguments.output, robot_to_toml(replace(robot, motors=found.motors)))
     if arguments.json:
         print_json(MotorMatchAnswer.of(found))
     else:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import tomllib
 from argparse import Namespace
 from pathlib import Path
@@ -141,13 +142,21 @@ def configuration(robot: Robot, texts: list[str], field: str, units: Units, pend
     return from_pendant(robot, values) if pendant else values
 
 
+def text_of(path: str, field: str) -> str:
+    """The text of a file, or of standard input for "-"; raises `InputError`."""
+    try:
+        return sys.stdin.read() if path == "-" else Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise InputError(field, path, f"a readable text file ({error})") from None
+
+
 def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:
     """The bodies in the file of ``--obstacles``."""
     if arguments.obstacles is None:
         return ()
     try:
-        data = tomllib.loads(Path(arguments.obstacles).read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError) as error:
+        data = tomllib.loads(text_of(arguments.obstacles, "--obstacles"))
+    except tomllib.TOMLDecodeError as error:
         raise InputError("--obstacles", arguments.obstacles, f"a readable TOML file ({error})") from None
     if set(data) != {"obstacles"}:
         raise InputError("--obstacles", sorted(data), "tables [[obstacles]] and nothing else")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from dataclasses import replace
-from pathlib import Path
 
+from app.cli.pipes.sink import write_output
 from app.cli.terminal import (
     Notation,
     configuration,
@@ -18,7 +18,7 @@ from app.cli.terminal import (
     units_of,
 )
 from app.exports.program_toml import toml_of
-from app.exports.progress import progress_bar
+from app.exports.progress import percent_bar
 from app.shared.answers.way import exits_answer, way_answer
 from kin import InputError, leave_singularity
 from kin.files.numbers import index_of
@@ -41,13 +41,7 @@ def run(arguments: Namespace) -> int:
     if seed is None:
         raise InputError("--seed", arguments.seed, f"a whole number from 0 to {MOST_SEED}")
     seconds = quantity(arguments.time_limit, SECONDS, "--time-limit")
-    seen = [0.0]
-    with progress_bar(100, "%", sys.stderr.isatty() and not arguments.json) as advance:
-
-        def progress(part: float) -> None:
-            advance(int(100 * part) - int(100 * seen[0]))
-            seen[0] = part
-
+    with percent_bar(sys.stderr.isatty() and not arguments.json) as progress:
         way = find_way(robot, q_start, q_goal, seed=seed, time_limit=seconds, progress=progress, **avoided)
     motion = way_program(way, **avoided) if way.found else None
     is_piped = arguments.output == "-"  # then standard output has the program alone
@@ -67,7 +61,7 @@ def run(arguments: Namespace) -> int:
     if arguments.output is not None:
         first = Ptp(JointTarget(tuple(q_start.tolist())))
         program = replace(motion.program, segments=(first, *motion.program.segments))
-        _write(arguments.output, toml_of(program, robot.name))
+        write_output(arguments.output, toml_of(program, robot.name))
     return 0 if motion.planned else 1
 
 
@@ -100,13 +94,3 @@ def run_out(arguments: Namespace) -> int:
         print("\n" + table(["to", *(joint.name for joint in robot.joints)], rows))
     clear = found.cause is not None and found.cause.code == "clear"
     return 0 if found.exits or clear else 1
-
-
-def _write(path: str, text: str) -> None:
-    if path == "-":
-        print(text, end="")
-        return
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError("--output", path, f"a file that can be written ({error})") from None

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from app.cli.pipes.sink import write_output
 from app.cli.terminal import (
     Notation,
     configuration,
@@ -25,7 +25,7 @@ from app.cli.terminal import (
 from app.exports import postures
 from app.exports.formats import FORMATS
 from app.exports.picture import draw
-from app.exports.progress import progress_bar
+from app.exports.progress import percent_bar
 from app.exports.save import opened, reading, save
 from app.shared.answers.postures import CuspidalAnswer, PostureMapAnswer
 from app.shared.answers.workspace import workspace_answer
@@ -166,7 +166,7 @@ def run_cuspidal(arguments: Namespace) -> int:
     """Print the verdict, and the corners of the loop if there is one."""
     robot = robot_of(arguments)
     constraints = joint_constraints(robot, arguments)
-    with _progress(arguments) as progress:
+    with percent_bar(sys.stderr.isatty() and not arguments.json) as progress:
         found = cuspidal(
             robot, constraints=constraints, poses=arguments.poses, seed=arguments.seed, progress=progress
         )
@@ -196,7 +196,7 @@ def run_postures(arguments: Namespace) -> int:
         joints = [(index_of(text, robot.n + 1) or 0) - 1 for text in arguments.joints]
         if min(joints) < 0:
             raise InputError("--joints", arguments.joints, f"two joints from 1 to {robot.n}")
-    with _progress(arguments) as progress:
+    with percent_bar(sys.stderr.isatty() and not arguments.json) as progress:
         found = posture_map(
             robot,
             pose,
@@ -209,25 +209,8 @@ def run_postures(arguments: Namespace) -> int:
             progress=progress,
         )
     if kind is not None:
-        try:
-            with opened(arguments.output) as file:
-                file.write(kind.write(found))
-        except OSError as error:
-            raise InputError("--output", arguments.output, f"a file that can be written ({error})") from None
+        write_output(arguments.output, kind.write(found))
     if arguments.json:
         return print_json(PostureMapAnswer.of(found))
     print(f"{robot.name} ({robot.id})\n\n{found.explain(units)}")
     return 0
-
-
-@contextmanager
-def _progress(arguments: Namespace) -> Iterator[Callable[[float], None]]:
-    """A bar of percents on a terminal."""
-    done = [0]
-    with progress_bar(100, "%", sys.stderr.isatty() and not arguments.json) as advance:
-
-        def progress(part: float) -> None:
-            advance(int(100 * part) - done[0])
-            done[0] = int(100 * part)
-
-        yield progress

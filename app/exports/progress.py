@@ -25,3 +25,17 @@ def progress_bar(total: int, unit: str, show: bool) -> Iterator[Callable[[int], 
 
     with tqdm(total=total, unit=f" {unit}", unit_scale=True, mininterval=INTERVAL, file=sys.stderr) as bar:
         yield bar.update
+
+
+@contextmanager
+def percent_bar(show: bool) -> Iterator[Callable[[float], None]]:
+    """The same for work that says which share of it is done."""
+    done = 0
+    with progress_bar(100, "%", show) as advance:
+
+        def progress(share: float) -> None:
+            nonlocal done
+            advance(int(100 * share) - done)
+            done = int(100 * share)
+
+        yield progress

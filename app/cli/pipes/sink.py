@@ -60,8 +60,8 @@ class Sink:
 
 
 @contextmanager
-def opened_output(path: str) -> Iterator[BinaryIO]:
-    """A file that appears when it is complete, or standard output for "-"; raises `InputError` for ``--output``.
+def opened_output(path: str, field: str = "--output") -> Iterator[BinaryIO]:
+    """A file that appears when it is complete, or standard output for "-"; raises `InputError` for the option.
 
     A reader of standard output that leaves is no error: `BrokenPipeError` passes.
     """
@@ -71,7 +71,13 @@ def opened_output(path: str) -> Iterator[BinaryIO]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise InputError("--output", path, f"a file that can be written ({error.strerror or error})") from None
+        raise InputError(field, path, f"a file that can be written ({error.strerror or error})") from None
+
+
+def write_output(path: str, content: str | bytes, field: str = "--output") -> None:
+    """Write such a file at once."""
+    with opened_output(path, field) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
 
 
 @contextmanager
