@@ -1,6 +1,6 @@
 #!/bin/sh
-# Check the scripts in static/ with ESLint. It is installed in .venv/lint once, with what tests make of the API document.
-# Arguments go to ESLint, e.g. --fix.
+# Check the scripts in static/ and examples/ with ESLint. It is installed in .venv/lint once, with what tests make of the API
+# document. Arguments go to ESLint, e.g. --fix.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
@@ -25,9 +25,9 @@ if ! cmp -s scripts/lint/package-lock.json "$tools/installed"; then
   mkdir -p "$tools"
   cp scripts/lint/package.json scripts/lint/package-lock.json "$tools"
   (cd "$tools" && run_npm ci --silent --ignore-scripts --no-audit --no-fund) ||
-    fail "npm could not install ESLint, which checks the scripts in static/"
+    fail "npm could not install ESLint, which checks the scripts of the pages"
   cp scripts/lint/package-lock.json "$tools/installed"
 fi
 # ESLint looks for its plugins beside its configuration.
 cp scripts/lint/eslint.config.mjs "$tools"
-run_node "$tools/node_modules/eslint/bin/eslint.js" --config "$tools/eslint.config.mjs" --max-warnings 0 static "$@"
+run_node "$tools/node_modules/eslint/bin/eslint.js" --config "$tools/eslint.config.mjs" --max-warnings 0 static examples "$@"

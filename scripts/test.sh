@@ -96,7 +96,7 @@ esac
 start kernels python -c "from kin.kernels.ahead import entries; entries()"
 step "ruff check" ruff check .
 step "ruff format" ruff format --check .
-step "the check of static/ (ESLint)" sh scripts/lint.sh
+step "the check of the scripts of pages (ESLint)" sh scripts/lint.sh
 start mypy mypy
 wait $programs && programs= || { programs=; fail "what the tests need could not be installed: the message is above."; }
 finish kernels || fail "kernels could not be compiled."

@@ -1,4 +1,4 @@
-// Rules for the scripts of the pages (static/*.js): mistakes, and one way of formatting. `sh scripts/lint.sh` checks,
+// Rules for the scripts of the pages (static/, examples/): mistakes, and one way of formatting. `sh scripts/lint.sh` checks,
 // `sh scripts/lint.sh --fix` also formats. Nothing of this is shipped.
 import js from "@eslint/js";
 import stylistic from "@stylistic/eslint-plugin";
@@ -12,7 +12,7 @@ export default [
   js.configs.recommended,
   stylistic.configs.customize({ quotes: "double", semi: true, braceStyle: "1tbs", arrowParens: true, quoteProps: "as-needed" }),
   {
-    files: ["static/*.js", "static/takehome/*.js"],
+    files: ["static/*.js", "static/takehome/*.js", "examples/*/*.js"],
     languageOptions: {
       ecmaVersion: 2023,
       sourceType: "script",

@@ -798,6 +798,8 @@
   if (solver) find("#target-title").textContent = "Target";
   if (solver) solveSoon();
   show();
-  // For scripts beside this one: what the page computes and shows.
-  window.kinboardArm = { fk, scene, q: () => state.q.slice(), target: () => state.target, found: () => state.found };
+  // For scripts beside this one: what the page computes and shows, and where the arm is to go.
+  window.kinboardArm = {
+    fk, linkPoses, scene, q: () => state.q.slice(), target: () => state.target, found: () => state.found, go: (q) => { pause(); go(q); },
+  };
 })();
