@@ -113,7 +113,7 @@
   // Before all other scripts, viser's included. A text that is being typed gets its letters.
   for (const kind of ["keydown", "keyup"]) {
     addEventListener(kind, (event) => {
-      if (overview?.open) { event.stopImmediatePropagation(); return; } // the browser itself closes it with Esc
+      if (document.querySelector("dialog:modal")) { event.stopImmediatePropagation(); return; } // the browser itself closes it with Esc
       if (event.key.length !== 1 || event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.target.matches?.("input, textarea, select, [contenteditable]") && event.target.type !== "checkbox") return;
       if (!on && event.key !== " ") event.stopImmediatePropagation();

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from app.classroom.tokens import new_code
+from app.live.announced import Announcement
 from app.live.codes import unused_code
 from app.live.recording import Recording
 from app.live.recording.recording import OPENED, SHOWN
@@ -26,7 +27,8 @@ from kin import Robot
 VALUES: Final = ("q", "gripper", "target", "result", "contacts", "program")
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
-QUIET: Final = frozenset({"drives", "readings", "measured", "draw", "clear"})  # changes nothing that undo restores
+# What changes nothing that undo restores.
+QUIET: Final = frozenset({"drives", "announce", "readings", "measured", "draw", "clear"})
 REPLIES: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -90,10 +92,14 @@ class Program:
 
 @dataclass(frozen=True)
 class Reply:
-    """What a program hears once: that what the message of this number asks for is done, or why it is not."""
+    """What a program hears once.
+
+    That what the message of this number asks for is done, or why it is not; or which of its buttons was pressed.
+    """
 
     number: int | None = None
     problem: Problem | None = None
+    pressed: str = ""
 
 
 @dataclass
@@ -126,6 +132,7 @@ class Line:
         self.ended = ""  # why, once it has
         self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
         self.measured: Sequence[float] | None = None  # where the real arm was last, in joint values
+        self.announced: Announcement | None = None  # the newest one of the program
         self.recording: Recording | None = None
 
     def note(self, way: str, text: str | bytes) -> None:
@@ -163,8 +170,9 @@ class Line:
         with self._lock:
             if self._program is not program:
                 return
-            self._program, self.readings, self.measured = None, None, None
-            self._pending[DRAWS] = PendingUpdate({"drives": None, "clear": True, "measured": None})
+            self._program, self.readings, self.measured, self.announced = None, None, None, None
+            left = {"drives": None, "announce": None, "clear": True, "measured": None}
+            self._pending[DRAWS] = PendingUpdate(left)
         self._post(DRAWS, None)
 
     def send(self, values: Mapping[str, Any], number: int | None = None) -> None:
@@ -174,6 +182,7 @@ class Line:
         with self._lock:
             self.readings = quiet.get("readings", self.readings)
             self.measured = quiet.get("measured", self.measured)
+            self.announced = quiet.get("announce", self.announced)
             for key, some in ((DRAWS, quiet), (MOVES, moving)):
                 waiting = self._pending[key].values
                 for name, value in some.items():
@@ -248,6 +257,21 @@ class Line:
                 self._replies.append(reply)
         if program is not None:
             program.wake()
+
+    def press(self, name: str, seen: Announcement | None = None) -> bool:
+        """Tell the program that one of its buttons was pressed; False: it does not offer it now.
+
+        Args:
+            seen: the announcement that the visitor has seen; None: any, for what stops something.
+        """
+        with self._lock:
+            program, announced = self._program, self.announced
+            button = None if announced is None else announced.button(name)
+            if program is None or button is None or not (seen is announced or (seen is None and button.stops)):
+                return False
+            self._replies.append(Reply(pressed=name))
+        program.wake()
+        return True
 
     def end(self, why: str) -> None:
         """End the connection of the program, and let no other come."""

@@ -11,7 +11,7 @@ import scservo_sdk
 from numpy.typing import NDArray
 
 import kin
-from app.servos.ports import SIMULATED, BusError, port_problem
+from app.servos.ports import BusError, is_simulated, port_problem
 from app.servos.registers import BAUD, GOAL, HOTTEST, PRESENT, TORQUE, TURN, VOLTAGE
 from app.servos.simulated import SimulatedPort, simulated_arm
 
@@ -40,10 +40,11 @@ Motors = Sequence[kin.motors.Motor]
 
 
 class Bus:
-    """Servos on a serial port; ``sim`` is a simulated arm.
+    """Servos on a serial port; ``sim`` is a simulated arm, ``sim:missing=3`` one with a fault.
 
     Raises:
         BusError: the port cannot be opened.
+        InputError: there is no such fault.
     """
 
     def __init__(self, port: str) -> None:
@@ -51,8 +52,8 @@ class Bus:
         self._handler = scservo_sdk.PortHandler(port)
         self._packets = scservo_sdk.PacketHandler(0)  # little-endian
         self._handler.baudrate = BAUD
-        if port == SIMULATED:
-            self._handler.ser = SimulatedPort(simulated_arm())
+        if is_simulated(port):
+            self._handler.ser = SimulatedPort(simulated_arm(port.partition(":")[2]))
             return
         try:
             self._handler.openPort()

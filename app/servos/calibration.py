@@ -9,7 +9,7 @@ from typing import Final
 
 import kin
 from app.servos.bus import named
-from app.servos.ports import SIMULATED
+from app.servos.ports import is_simulated
 from app.servos.simulated import CALIBRATION
 
 _HOME: Final = Path(".cache", "huggingface")  # in the home folder, unless HF_HOME names another one
@@ -52,9 +52,9 @@ class Calibration:
     """
 
     def __init__(self, file: str | None, port: str) -> None:
-        self._table = CALIBRATION if port == SIMULATED and file is None else None
+        self._table = CALIBRATION if is_simulated(port) and file is None else None
         self._text = ""
-        if file is None and port != SIMULATED:
+        if file is None and not is_simulated(port):
             found = sorted(_folder().glob("so10*_follower/*.json"))
             if len(found) > 1:
                 raise kin.KinematicsError("\n  ".join(["--calibration: which of these?", *map(str, found)]))

@@ -22,6 +22,7 @@ import kin
 from app.live import invite
 from app.notebook.process import ServiceProcess
 from app.viewer.session.state import encode, with_arm
+from kin.notebook.driving import SLOW
 
 NAME: Final = "kinboard so101"
 RATE: Final = 60.0  # configurations of the page a second
@@ -56,7 +57,8 @@ def run(arguments: Namespace, robot: kin.Robot, known: Sequence[kin.Robot]) -> i
             calibration.applied(robot)  # what is lacking is said before a page is opened
         with contextlib.closing(Bus(port)) as bus, _page(arguments, robot, known) as page:
             print(f"Connected to the page with {page.robot.name}.", flush=True)
-            session = Session(page, bus, calibration.applied, typed(), arguments.speed, arguments.seconds)
+            speed = SLOW if arguments.speed is None else arguments.speed
+            session = Session(page, bus, calibration.applied, typed(), speed, arguments.seconds)
             session.run(arguments.release)
     except KeyboardInterrupt:
         print("Ended.")

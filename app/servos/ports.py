@@ -10,7 +10,12 @@ from serial.tools.list_ports import comports
 
 import kin
 
-SIMULATED: Final = "sim"  # the name of the simulated bus
+SIMULATED: Final = "sim"  # the name of the simulated bus, before a colon and its faults
+
+
+def is_simulated(port: str) -> bool:
+    """Whether a port is the simulated bus."""
+    return port.partition(":")[0] == SIMULATED
 
 
 class BusError(kin.KinematicsError):

@@ -1,13 +1,16 @@
 """A session with a page and an arm: a mirror that writes nothing, until the owner says *enable*; then it follows.
 
-The owner types `COMMANDS`. The gripper moves no joint of the model: it follows the page's slider of the gripper.
+The owner types `COMMANDS`, or presses the buttons of the page, which are the same words. What stops the arm is
+said in both; then the session goes on, and the arm waits for the next *enable*, unless page or bus are lost. The
+gripper moves no joint of the model: it follows the page's slider of the gripper.
 """
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from queue import Empty, SimpleQueue
 from typing import Any, Final
 
@@ -19,7 +22,7 @@ from app.servos.bus import Bus
 from app.servos.calibration import gripper_of, moving
 from app.servos.ports import BusError
 from app.servos.scale import Scale
-from kin.notebook.driving import Guide
+from kin.notebook.driving import Guide, PageLostError
 
 CYCLE: Final = 0.02  # s
 RESTING: Final = 0.5  # s between two tries of a bus whose servos do not answer
@@ -29,6 +32,17 @@ COMMANDS: Final = """Type and press Enter:
   stop        hold the arm where it is
   release     switch the motors off: hold the arm with your hand
   quit        end"""
+MIRROR: Final = "The ghost is where the arm is. Nothing moves before you press Enable."
+FOLLOWS: Final = "The arm follows this page at up to {:g} deg/s"
+HELD: Final = "The arm holds its place: its motors are on."
+OFF: Final = "The motors are off."
+Button = Mapping[str, str | bool]
+RELEASE: Final[Button] = {
+    "name": "release",
+    "label": "Release",
+    "confirm": "The motors are switched off. Hold the arm with your hand, or it falls.",
+}
+LONGEST: Final = 300  # characters that the page shows of what is announced
 GRIPPER_SPEED: Final = 50.0  # of 100, a second
 SQUEEZE: Final = 150  # ticks (13°) that the goal of the gripper is ahead at most: how hard it grips
 
@@ -120,6 +134,18 @@ class Session:
         self._gripper = None if motor is None else Gripper(bus, motor)
         self._opening: float | None = None  # that the page's gripper had last, while the arm follows
         self._enabled = False
+        say = FOLLOWS.format(speed).replace("follows", "will follow")
+        enable: Button = {
+            "name": "enable",
+            "label": "Enable",
+            "confirm": f"{say}. Keep its power switch within reach.",
+        }
+        stop: Button = {"name": "stop", "label": "Stop", "stops": True}
+        self._offered: Mapping[str, list[Button]] = {
+            "ready": [enable, RELEASE],
+            "enabled": [stop, RELEASE],
+            "stopped": [enable, RELEASE],
+        }
 
     def run(self, release: bool = False) -> None:
         """Check the bus, then show and drive until the end; `release`: switch the motors off then.
@@ -129,13 +155,41 @@ class Session:
         """
         print(self._bus.check(self._all), flush=True)
         print(COMMANDS, flush=True)
+        threading.Thread(target=self._hear, args=(self._page.events(),), daemon=True).start()
+        self._announce("ready", MIRROR)
         while self._mirror() == "enable":
             self._enabled = True
-            if self._drive(release) == "quit":
+            if self._follow(release) == "quit":
                 return
-            self._page.drives = None
         if release and self._enabled:
             self._release()
+
+    def _hear(self, events: Iterable[Any]) -> None:
+        """Take what is pressed in the page as if it were typed."""
+        for event in events:
+            if event.kind == "pressed":
+                self._typed.put(event.value)
+
+    def _announce(self, state: str, words: str) -> None:
+        """Say in the page how the arm does, with the buttons of this state; in a fault it can only be released."""
+        self._page.announce(words[:LONGEST], self._offered.get(state, [RELEASE]), state)
+
+    def _follow(self, release: bool) -> str:
+        """Drive the arm until its owner ends that, or something stops it; returns the word that ends it."""
+        try:
+            word, state, words = self._drive(release), "stopped", HELD
+        except kin.KinematicsError as error:
+            if isinstance(error, PageLostError) or not self._page.connected:
+                raise
+            word, state, words = "stop", "stopped", f"{error}."
+            print(words, file=sys.stderr, flush=True)
+            if _is_gone(error):
+                self._announce("fault", words)
+                raise
+        if word != "quit":
+            self._page.drives = None
+            self._announce(*(("ready", OFF) if word == "release" else (state, words)))
+        return word
 
     @property
     def _all(self) -> list[kin.motors.Motor]:
@@ -162,31 +216,38 @@ class Session:
             word = self._next()
             if word in ("enable", "quit"):
                 return word
-            self._release_or_refuse(word)
             try:
+                self._release_or_refuse(word)
                 self._show()
             except BusError as error:
-                if "gone" in str(error):
+                if _is_gone(error):
+                    self._announce("fault", f"{error}.")
                     raise
                 if str(error) != lost:
                     lost = str(error)
-                    print(f"{lost}. The ghost is hidden meanwhile.", flush=True)
+                    self._say("fault", f"{lost}. The ghost is hidden meanwhile.")
                 self._hide()
                 time.sleep(RESTING)
             else:
                 if lost:
-                    print("All servos answer again.", flush=True)
+                    self._say("stopped" if self._enabled else "ready", "All servos answer again.")
                 lost = ""
             time.sleep(CYCLE)
 
+    def _say(self, state: str, words: str) -> None:
+        """Say something in the terminal and in the page."""
+        print(words, flush=True)
+        self._announce(state, words)
+
     def _release(self) -> None:
         self._bus.switch(self._all, False)
-        print("The motors are off.", flush=True)
+        print(OFF, flush=True)
 
     def _release_or_refuse(self, word: str) -> None:
         """Do what may be asked of an arm that does not follow."""
         if word == "release":
             self._release()
+            self._announce("ready", OFF)
         elif word.startswith("gripper"):
             print("The gripper moves after enable only.", flush=True)
         elif word and word != "stop":
@@ -222,17 +283,19 @@ class Session:
     def _drive(self, release: bool) -> str:
         """Let the arm follow the page, from where it is; returns the word that ends it."""
         bus, page, motors = self._bus, self._page, self._motors
-        print(f"The arm follows at up to {self._speed:g} deg/s. Keep its power switch within reach.", flush=True)
+        print(f"{FOLLOWS.format(self._speed)}. Keep its power switch within reach.", flush=True)
         scale = Scale(self._robot, motors, bus.positions(motors))
         if lost := bus.hold(motors):  # the goal first: a servo that is switched on goes to its last one
             raise BusError("; ".join(lost))
         guide: Guide | None = None
+        released = False
         try:
             bus.switch(motors, True)
             q = scale.q(bus.positions(motors))
             guide = Guide(page, f"{self._arm.name} at {bus.port}", self._speed, q, scale.limits)
             self._show_gripper()
             print("The arm follows the page.", flush=True)
+            self._announce("enabled", f"{FOLLOWS.format(self._speed)}.")
             while (word := self._next()) not in ("stop", "release", "quit"):
                 self._command(word)
                 q, heard = scale.q(bus.positions(motors)), time.monotonic()
@@ -242,12 +305,15 @@ class Session:
                     self._write(scale, guide.asked, guide.commanded)
                 self._follow_gripper()
                 time.sleep(CYCLE)
-            release = word == "release" or (release and word == "quit")
+            released = word == "release" or (release and word == "quit")
             return word
+        except KeyboardInterrupt:
+            released = release
+            raise
         finally:
             if guide is not None:
                 guide.end()
-            self._stop(release)
+            self._stop(released)
 
     def _command(self, word: str) -> None:
         """Do what may be asked of an arm that follows."""
@@ -309,3 +375,8 @@ class Session:
         for why in lost:
             print(f"{why}. It goes on to its last goal, which is close by.", file=sys.stderr)
         print("The arm holds its place: its motors stay on until its power is off.", flush=True)
+
+
+def _is_gone(error: Exception) -> bool:
+    """Whether the port of the bus is lost."""
+    return isinstance(error, BusError) and "is gone" in str(error)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from app.servos.registers import BAUD, GOAL, HOTTEST, LEAST, MODEL, MOST, OFFSET, PRESENT, TORQUE, TURN, VOLTAGE
+from kin.errors import InputError
 
 PING, READ, WRITE, SYNC_WRITE, EVERYBODY = 0x01, 0x02, 0x03, 0x83, 0xFE
 SPEED = 3000.0  # ticks/s of a servo on its way
@@ -199,9 +200,39 @@ class SimulatedPort:
         """Nothing is to be closed."""
 
 
-def simulated_arm() -> Line:
-    """An SO-101 with `CALIBRATION`, at `START`, switched off."""
+def _each(line: Line, address: int, *values: int) -> None:
+    for servo in line.servos.values():
+        servo.put(address, bytes(values))
+
+
+# What `--port sim:…` can have go wrong, by name: what its number may be, and what it does to the line.
+FAULTS: Final[dict[str, tuple[str, range, Callable[[Line, int], object]]]] = {
+    "missing": ("a servo", range(1, 7), lambda line, number: line.missing.add(number)),
+    "kind": ("a servo", range(1, 7), lambda line, number: line.servos[number].put(MODEL, b"\x04\x05")),
+    "overload": ("a servo", range(1, 7), lambda line, number: setattr(line.servos[number], "error", 1 << 5)),
+    "stuck": ("a servo", range(1, 7), lambda line, number: setattr(line.servos[number], "stuck", True)),
+    "baud": ("its rate", range(38_400, 1_000_001), lambda line, number: setattr(line, "baud", number)),
+    "volts": ("of its supply", range(26), lambda line, number: _each(line, VOLTAGE, 10 * number)),
+    "celsius": ("of its servos", range(101), lambda line, number: _each(line, VOLTAGE + 1, number)),
+}
+
+
+def simulated_arm(faults: str = "") -> Line:
+    """An SO-101 with `CALIBRATION`, at `START`, switched off, with faults such as ``missing=3,stuck=1``.
+
+    Raises:
+        InputError: there is no such fault.
+    """
     line = Line(START)
     for entry in CALIBRATION.values():
         line.servos[entry["id"]].calibrate(entry)
+    for fault in faults.split(",") if faults else ():
+        name, _, text = fault.partition("=")
+        what, numbers, spoil = FAULTS.get(name, ("", range(0), None))
+        if spoil is None:
+            raise InputError("--port", f"sim:{faults[:80]}", f"sim, or sim: and faults of {', '.join(FAULTS)}")
+        if not (text.isascii() and text.isdecimal() and len(text) < 8 and int(text) in numbers):
+            known = f"{name}=N, {what}: {numbers[0]} to {numbers[-1]}"
+            raise InputError("--port", f"sim:{faults[:80]}", known)
+        spoil(line, int(text))
     return line

@@ -37,6 +37,10 @@ class StoppedError(KinematicsError):
     """The arm was not moved, or not any further; the message says why."""
 
 
+class PageLostError(StoppedError):
+    """The page does not answer: nobody can say in it why the arm was stopped."""
+
+
 class Guide:
     """Leads an arm to the configuration that its page shows, at a limited speed.
 
@@ -104,7 +108,7 @@ class Guide:
         now = time.monotonic()
         elapsed, self._before = min(now - self._before, LATEST), now
         if not self._page.connected or now - self._alive > PAGE_LOST:
-            raise StoppedError("the page does not answer: the arm is not moved any further")
+            raise PageLostError("the page does not answer: the arm is not moved any further")
         if now - heard > ARM_LOST:
             raise StoppedError(f"the arm has said nothing for {ARM_LOST:g} s: it is not moved any further")
         q = self._page.q

@@ -112,6 +112,55 @@ def test_the_frame_stays_and_goes_while_the_panel_is_folded_away(tab: Tab, drivi
     assert_framed(tab)
 
 
+ENABLE = {
+    "name": "enable",
+    "label": "Enable",
+    "confirm": "The arm will follow this page at up to 20 deg/s. Keep its power switch within reach.",
+}
+STOP = {"name": "stop", "label": "Stop", "stops": True}
+
+
+def test_what_a_program_offers_is_pressed_with_a_second_step_and_stopped_at_once(tab: Tab, driving: Any) -> None:
+    page, dialog = tab.page, tab.page.locator("#kb-confirm")
+    events = (event.value for event in driving.events() if event.kind == "pressed")
+    driving.announce("The ghost is where the arm is.", [ENABLE])
+    card = tab.status.locator("[data-announced]")
+    expect(card).to_contain_text("Ready arm.py: The ghost is where the arm is.")
+    for no in ("Escape", "Cancel"):
+        card.get_by_role("button", name="Enable").click()
+        expect(dialog).to_be_visible()
+        expect(dialog).to_contain_text(ENABLE["confirm"])
+        expect(dialog.get_by_role("button", name="Cancel")).to_be_focused()
+        if no == "Escape":
+            tab.screenshot("enable-asked")
+            page.keyboard.press("j")  # moves no target meanwhile
+            page.keyboard.press("Escape")
+        else:
+            dialog.get_by_role("button", name="Cancel").click()
+        expect(dialog).to_be_hidden()
+    card.get_by_role("button", name="Enable").click()
+    driving.announce("The ghost is where the arm is. Its power is off.", [ENABLE], state="fault")
+    expect(dialog).to_be_hidden()
+    expect(card).to_contain_text("Fault")
+    card.get_by_role("button", name="Enable").click()
+    dialog.get_by_role("button", name="Enable").click()
+    assert next(events) == "enable", "the first press that the program has heard"
+    driving.announce("The arm follows this page at up to 20 deg/s.", [STOP], state="enabled")
+    stop = page.locator("#kb-driven").get_by_role("button", name="Stop")
+    expect(stop).to_be_visible()
+    tab.screenshot("enabled")
+    card.get_by_role("button", name="Stop").click()
+    assert next(events) == "stop"
+    page.get_by_label("Collapse panel area").or_(page.get_by_label("Collapse column")).first.click()
+    expect(tab.page.locator("[data-status]")).to_have_count(0)
+    stop.click()
+    assert next(events) == "stop", "with the panel folded away"
+    page.get_by_label("Expand").first.click()
+    assert driving.target is None, "keys of the scene rest while something is asked"
+    driving.announce(None)
+    expect(stop).to_have_count(0)
+
+
 OPEN = """([name, text, drop]) => {
   const dataTransfer = new DataTransfer();
   dataTransfer.items.add(new File([Uint8Array.from(text)], name));
@@ -187,3 +236,17 @@ def test_the_words_fit_a_phone(phone: Tab, address: str) -> None:
         seen = phone.page.evaluate(SEEN)
         assert seen["inside"]
         assert seen["seen"]
+        arm.announce("The arm follows this page at up to 20 deg/s.", [STOP, ENABLE], state="enabled")
+        in_frame = phone.page.locator("#kb-driven button")
+        expect(in_frame).to_be_visible()
+        button, words = in_frame.bounding_box(), phone.page.locator("#kb-driven b").bounding_box()
+        assert button is not None
+        assert words is not None
+        assert button["height"] >= 44
+        assert words["x"] + words["width"] <= button["x"], "the words end before it"
+        phone.screenshot("enabled-phone")
+        phone.status.get_by_role("button", name="Enable").click()
+        expect(phone.page.locator("#kb-confirm")).to_be_visible()
+        phone.screenshot("enable-asked-phone")
+        phone.page.get_by_role("button", name="Cancel").click()
+        in_frame.click(trial=True)

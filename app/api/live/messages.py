@@ -20,6 +20,7 @@ from app.api.program import DescribedBy, ProgramBody
 from app.api.schemas import Body, Configuration, Vector3, Vector4, integral
 from app.api.workspace.query import validated
 from app.live import VALUES
+from app.live.announced import Announcement, Button, State
 from app.shared.problems import FieldError, show
 from app.shared.store import Store
 from kin import InputError, Robot, UnknownRobotError
@@ -34,6 +35,7 @@ MOST_BYTES = 64 * 1024  # of a message
 MOST_POINTS = 2000  # of a drawing
 MOST_RATE, USUAL_RATE = 60.0, 30.0  # messages a second that a program may ask for, and gets by default
 LONGEST_NAME, LONGEST_LABEL = 60, 200  # characters
+LONGEST_WORDS, LONGEST_BUTTON, MOST_BUTTONS = 300, 24, 4  # of what a program announces
 SLACK = 1e-6  # rad or m beyond a limit: rounding of who computed the values
 
 _Color = Annotated[str, Field(pattern="^#[0-9a-fA-F]{6}$")]
@@ -90,6 +92,39 @@ class LabelDrawing(Body):
 
 
 Drawing = Annotated[PointsDrawing | LineDrawing | FrameDrawing | LabelDrawing, Field(discriminator="kind")]
+
+
+class AnnouncedButton(Body):
+    """What the visitor can ask of the program."""
+
+    name: str = Field(
+        pattern="^[a-z][a-z0-9_-]{0,31}$", description="Its name, which the program hears when it is pressed."
+    )
+    label: str = Field(min_length=1, max_length=LONGEST_BUTTON, description="What the page writes on it.")
+    confirm: str | None = Field(
+        None,
+        min_length=1,
+        max_length=LONGEST_WORDS,
+        description="What happens then: the page shows this sentence, and asks before it passes the press on.",
+    )
+    stops: bool = Field(
+        False,
+        strict=True,
+        description="true: it stops something. It can be pressed at once, in a class that is frozen, too, and is "
+        "in the red frame of `drives`.",
+    )
+
+
+class Announced(Body):
+    """What the program says of itself in the status card, and the buttons there."""
+
+    words: str = Field(min_length=1, max_length=LONGEST_WORDS, description="One sentence.")
+    state: State = Field(
+        "ready",
+        description="ready: nothing moves. enabled: what the page shows is followed. stopped: no longer, and the "
+        "sentence says why. fault: what is wrong.",
+    )
+    buttons: list[AnnouncedButton] = Field([], max_length=MOST_BUTTONS, description="Each with a name of its own.")
 
 
 class Subscription(Body):
@@ -161,6 +196,11 @@ class LiveMessage(Body):
         description="What the program moves beside the page, such as `SO-101 at /dev/ttyACM0`: the page has a red "
         "frame with this name until the program leaves, or says null.",
     )
+    announce: Announced | None = Field(
+        None,
+        description="State, words and buttons of the program in the status card of the page; null removes them. "
+        "The program hears `pressed`, with the name of the button.",
+    )
     clear: Annotated[bool, Field(strict=True)] | None = Field(
         None, description="true: remove everything that the program has drawn, before `draw`."
     )
@@ -230,6 +270,8 @@ def read(text: str, robot: Robot, store: Store) -> Message:
         values["play"] = body.play
     if "drives" in given:
         values["drives"] = None if body.drives is None else _printable(body.drives)
+    if "announce" in given:
+        values["announce"] = None if body.announce is None else _announced(body.announce)
     if body.clear:
         values["clear"] = True
     if body.draw is not None:
@@ -264,11 +306,28 @@ def _read_motors(robot: Robot, readings: list[float] | None) -> dict[str, Any]:
     return {"readings": read.tolist(), **({"measured": q_from_readings(robot, read)} if known else {})}
 
 
-def _printable(name: str) -> str:
-    """A name as the page shows it; raises 422 for one in which there is nothing to be seen."""
-    found = "".join(c for c in " ".join(name.split()) if c.isprintable())
+def _announced(given: Announced) -> Announcement:
+    """What the program announces; raises 422."""
+    names = [button.name for button in given.buttons]
+    buttons = []
+    for i, button in enumerate(given.buttons):
+        field = f"announce.buttons[{i}]"
+        if button.name in names[:i]:
+            raise invalid(FieldError(field=f"{field}.name", value=show(button.name), expected="another name each"))
+        if button.stops and button.confirm is not None:
+            expected = "none: a button that stops something is pressed at once"
+            raise invalid(FieldError(field=f"{field}.confirm", value=show(button.confirm), expected=expected))
+        label = _printable(button.label, f"{field}.label")
+        confirm = "" if button.confirm is None else _printable(button.confirm, f"{field}.confirm")
+        buttons.append(Button(button.name, label, confirm, button.stops))
+    return Announcement(_printable(given.words, "announce.words"), given.state, tuple(buttons))
+
+
+def _printable(text: str, field: str = "drives") -> str:
+    """A text as the page shows it; raises 422 for one in which there is nothing to be seen."""
+    found = "".join(c for c in " ".join(text.split()) if c.isprintable())
     if not found:
-        raise invalid(FieldError(field="drives", value=show(name), expected="a name that can be read, or null"))
+        raise invalid(FieldError(field=field, value=show(text), expected="a text that can be read, or null"))
     return found
 
 

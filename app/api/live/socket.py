@@ -256,7 +256,8 @@ class Conversation:
                 self._known.update({name: number for name, (number, _) in values.items()})
                 await self._send(news({name: value for name, (_, value) in values.items()}))
             for reply in replies:
-                self._own.append(_letter(reply.number, reply.problem))
+                pressed = {"type": "pressed", "button": reply.pressed}
+                self._own.append(pressed if reply.pressed else _letter(reply.number, reply.problem))
             while self._own:
                 await self._send(self._own.popleft())
 

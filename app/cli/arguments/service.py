@@ -40,14 +40,14 @@ def add_so101(parser: ArgumentParser) -> None:
         "robot", metavar="ROBOT", nargs="?", default="so101", help="id of the arm, or a robot file (default so101)"
     )
     parser.add_argument(
-        "--port", help="serial port, such as /dev/ttyACM0 or COM3; sim: a simulated arm (default: the one on USB)"
+        "--port",
+        help="serial port, such as /dev/ttyACM0 or COM3; sim: a simulated arm; sim:missing=3: one with a fault "
+        "(default: the one on USB)",
     )
     parser.add_argument(
         "--calibration", metavar="FILE.json", help="of this arm, by LeRobot (default: the one in LeRobot's folder)"
     )
-    parser.add_argument(
-        "--speed", type=positive, default=20.0, help="of a joint, deg/s, at most (default %(default)g)"
-    )
+    parser.add_argument("--speed", type=positive, help="of a joint, deg/s, at most (default 20)")
     parser.add_argument("--release", action="store_true", help="switch the motors off at the end")
     parser.add_argument("--seconds", type=positive, help="end after this time")
     parser.add_argument(

@@ -39,8 +39,9 @@ class Event:
 
     Attributes:
         kind: ``"q"``, ``"gripper"``, ``"target"``, ``"result"``, ``"contacts"``, ``"program"``, ``"robot"``;
-            ``"problem"`` for a value that was refused later; ``"disconnected"`` and ``"connected"``.
-        value: as the property of that name has it; of a problem, the `RefusedError`.
+            ``"problem"`` for a value that was refused later; ``"pressed"``; ``"disconnected"``, ``"connected"``.
+        value: as the property of that name has it; of a problem, the `RefusedError`; of a press, the name of the
+            button.
     """
 
     kind: str
@@ -75,6 +76,7 @@ class Page:
         self._measured: Array | None = None
         self._readings: Array | None = None
         self._drives: str | None = None
+        self._announced: dict[str, Any] | None = None
         self._rate = rate
         self._readers: list[_Reader] = []
         self._recordings: list[Recording] = []
@@ -251,6 +253,24 @@ class Page:
         """Stop the program that is played."""
         self._ask(play=False)
 
+    def announce(self, words: str | None, buttons: Sequence[Mapping[str, Any]] = (), state: str = "ready") -> None:
+        """Say in the status card of the page how this program does, and offer buttons there; None: no longer.
+
+        A press by its visitor is an event: ``pressed``, with the name of the button. Returns when the page shows
+        them; they come back with the connection.
+
+        Args:
+            words: one sentence.
+            buttons: at most four, each ``{"name": "enable", "label": "Enable"}``; with ``"confirm"``, a sentence
+                with which the page asks first; with ``"stops": True``, one that can be pressed whatever else is
+                withheld.
+            state: ``"ready"``, ``"enabled"``, ``"stopped"`` or ``"fault"``.
+        """
+        offered = [dict(each) for each in buttons]
+        said = None if words is None else {"words": words, "state": state, "buttons": offered}
+        self._ask(announce=said)
+        self._announced = said
+
     def place(self, obstacles: Sequence[Obstacle | Mapping[str, Any]]) -> None:
         """Place these obstacles, in place of all that there are."""
         self._ask(obstacles=[_plain(each) for each in obstacles])
@@ -372,6 +392,8 @@ class Page:
         found: list[Message] = [{"subscribe": {"values": list(VALUES), "rate": self._rate}}]
         if self._drives is not None:
             found.append({"drives": self._drives})
+        if self._announced is not None:
+            found.append({"announce": self._announced})
         if self._measured is not None:
             found.append({"measured": self._measured.tolist()})
         return found + [{"draw": {name: drawn}} for name, drawn in self.draw.shown.items()]
@@ -399,6 +421,8 @@ class Page:
             if kind == "problem" and not message.get("asked"):
                 self._refused = RefusedError(message["problem"])
                 self._tell(Event("problem", self._refused))
+            elif kind == "pressed":
+                self._tell(Event("pressed", message["button"]))
             elif kind == "disconnected":
                 self._sent = None
                 self._tell(Event("disconnected"))

@@ -43,6 +43,7 @@ _TYPES: dict[str, dict[str, Any]] = {
     "readings": {"anyOf": [_NUMBERS, {"type": "null"}]},
     "gripper": {"type": ["number", "null"]},
     "drives": {"type": ["string", "null"]},
+    "announce": {"type": ["object", "null"]},
     "play": {"type": "boolean"},
     "clear": {"type": "boolean"},
     "contacts": {"type": "array"},

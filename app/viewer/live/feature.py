@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from app.live.announced import Announcement
 from app.live.recording import Bounds, Recording
 from app.live.recording.recording import READ
 from app.viewer.declared.facts import Facts
@@ -31,7 +32,7 @@ from app.viewer.meshes.incoming import IncomingFile, not_sent
 from app.viewer.own_arm import own_arm
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
-from kin import KinematicsError, robot_to_dict
+from kin import InputError, KinematicsError, robot_to_dict
 from kin.collision import Contact
 from kin.transforms import Array
 
@@ -39,6 +40,7 @@ STOPPED = "stopped"
 UNUSED = "The file was not used"
 OPENED = Bounds(LONGEST, BYTES, OF_ALL)
 LOOK_AGAIN = 1.0  # s between two looks at the rate of a program and its delay
+FRAME = 0.1  # s of a recording that pass at most between two frames of a driven arm
 GHOST, OPACITY = (230, 159, 0), 0.45
 
 
@@ -53,6 +55,8 @@ class TapeSettings(Settings):
         drawings: what the program draws.
         measured: where it has measured the arm ``(n,)``.
         driven: what it drives.
+        announced: what it says of itself and offers, and a number of its own.
+        said: what it has said of itself last.
         program: its name; "": none is connected.
     """
 
@@ -60,6 +64,8 @@ class TapeSettings(Settings):
     drawings: Drawings | None = memory(renew=False)
     measured: Array | None = memory()
     driven: str = memory("", renew=False)
+    announced: tuple[int, Announcement] | None = memory(renew=False)
+    said: Announcement | None = memory(renew=False)
     program: str = memory("", renew=False)
 
 
@@ -73,7 +79,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     key = "connect"
     title = "Connected program"
     settings_of, facts_of = TapeSettings, Facts
-    messages = frozenset({"upload", "stop"})
+    messages = frozenset({"upload", "stop", "press", "confirm", "halt"})
     files = MappingProxyType({"upload": OPENED.size})
     undo: ClassVar[dict[str, str]] = {"on_show_arm": "Another arm"}
 
@@ -87,13 +93,17 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     # What the program sends
 
     def use(self, values: Mapping[str, Any]) -> None:
-        """Take what the program draws and measures; raises `kin.InputError`."""
+        """Take what the program says, draws and measures; raises `kin.InputError`."""
         self.schedule()
-        if "drives" in values:
+        if "drives" in values and self.settings.driven != (values["drives"] or ""):
             self.change(driven=values["drives"] or "")
-            self.stage.channel.show("driven", self.settings.driven)
-            if self.settings.driven:
-                self._tape.stop()
+            self._tape.stop()
+        if "announce" in values:
+            said = values["announce"]
+            numbered = None if said is None else (next(self._numbers), said)
+            self.change(announced=numbered, said=said or self.settings.said)
+        if not {"drives", "announce"}.isdisjoint(values):
+            self._show_driven()
         if "measured" in values:
             measured = values["measured"]
             if measured is not None:
@@ -104,6 +114,30 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if drawn := values.get("draw"):
             self.change(drawings=merged(self.settings.drawings or {}, drawn, self._numbers))
 
+    def _show_driven(self) -> None:
+        """Frame the page while something is driven, with what stops it."""
+        driven, found = self.settings.driven, self.settings.announced
+        stop = None if found is None else found[1].stop
+        self.stage.channel.show("driven", driven)
+        self.stage.channel.show("stop", ["", ""] if stop is None or not driven else [stop.name, stop.label])
+
+    def _press(self, event: str, name: str, number: object) -> None:
+        """Pass a press on to the program; raises `InputError` for one that no button of ours sends.
+
+        What stops something counts whatever else the program has announced since.
+        """
+        line, (own, seen) = self.stage.door.line, self.settings.announced or (0, None)
+        if event == "halt":
+            passed = line is not None and line.press(name)
+        else:
+            button = None if seen is None or number != own else seen.button(name)
+            if button is not None and button.event != event:
+                raise InputError("button", f"{event} {name}", f"{button.event} {name}")
+            passed = line is not None and button is not None and line.press(name, seen)
+        if not passed:
+            words = "The program has changed what it offers. Look at its buttons, and press again."
+            self.stage.status.show(Notice("advice", "Not passed on", words))
+
     # A recording that is opened
 
     def heard(self, key: Hashable, value: object) -> None:
@@ -112,6 +146,8 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
                 self._opening.expect(value)
             case ("stop", int()):
                 self.on_close()
+            case ("press" | "confirm" | "halt" as event, str(name), int()):
+                self._press(event, name, value)
             case ("upload",):
                 if isinstance(value, IncomingFile):
                     self._opening.take(value)
@@ -187,7 +223,10 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
 
     @property
     def offer(self) -> str:
-        return views.stop(self.settings.program) if self.settings.program else ""
+        program, found = self.settings.program, self.settings.announced
+        if not program:
+            return ""
+        return views.stop(program) if found is None else views.announced(program, *found)
 
     # Declared
 
@@ -196,7 +235,9 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         name = "" if line is None or line.program is None else line.program.name
         found: list[Work | Sweep] = [Work("program", self._meet, (name,))]
         if self._tape.playing:
-            found.append(Sweep(self._play, self.stage.services.pace.interval, math.inf))
+            # A driven arm goes on where it was after a pause of the machine.
+            most = FRAME if self.settings.driven else math.inf
+            found.append(Sweep(self._play, self.stage.services.pace.interval, most))
         elif name or self._tape.running or self._opening.busy is not None:
             found.append(Sweep(self._look, LOOK_AGAIN))
         return found
@@ -208,16 +249,24 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if name and name != before:
             self.stage.status.show(Notice("hand", f"{name} is connected", "It may move the arm. Tab Program."))
         elif before and not name and self.stage.door.line is not None:
-            self.stage.status.show(Notice("hand", f"{before} has left", "The code still counts."))
+            said = self.settings.said
+            self.change(said=None)
+            bad = said is not None and said.state in ("stopped", "fault")
+            words = said.words if said is not None and bad else "The code still counts."
+            self.stage.status.show(Notice("error" if bad else "hand", f"{before} has left", words))
 
     def _look(self, seconds: float) -> None:
         """Look at the rate of the program and its delay, and how far a recording or a file is."""
         self.schedule()
 
     def _play(self, seconds: float) -> None:
-        """Show the next frame of the recording."""
-        measured = self._tape.advance(seconds)
-        self.change(at=self._tape.time, measured=measured)
+        """Show the next frame of the recording; a driven arm is led by it, and its own ghost stays."""
+        if self.settings.driven:
+            if (measured := self._driven_arm()) is not None:
+                self._tape.lead(seconds, measured)
+        else:
+            self.change(measured=self._tape.advance(seconds))
+        self.change(at=self._tape.time)
         self.rewrite()
 
     def panel(self) -> Sequence[PanelNode]:
@@ -307,16 +356,27 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
 
     def changed(self, path: str) -> None:
         self._tape.stop()
-        if self._may_play():
+        if self.settings.driven:
+            self._tape.time = self.settings.at
+            words = f"Play recording has {self.settings.driven} go on from there."
+            self.stage.status.show(Notice("hand", f"The recording at {self._tape.time:.2f} s", words))
+        elif self._tape.playable:
             self.change(measured=self._tape.show(self.settings.at))
 
+    def _driven_arm(self) -> Array | None:
+        """Where a driven arm is ``(n,)``, as its program says; None: it does not."""
+        line = self.stage.door.line
+        found = None if line is None or line.measured is None else np.array(line.measured)
+        return found if found is None or len(found) == self.stage.arm.now.robot.n else None
+
     def _may_play(self) -> bool:
-        """Whether the arm may be moved as recorded."""
-        if self.settings.driven:
+        """Whether the arm may be moved as recorded: a driven one must say where it is, to be waited for."""
+        if self.settings.driven and self._driven_arm() is None:
             title = f"{self.settings.driven} is driven"
-            detail = "It would move as recorded. Let its program play the recording."
+            detail = "It does not say where it is, so a recording cannot wait for it. Its program can play it."
             self.stage.status.show(Notice("error", title, detail))
-        return self._tape.playable and not self.settings.driven
+            return False
+        return self._tape.playable
 
     def on_save(self, kind: str) -> None:
         """Download the recording."""
@@ -332,6 +392,6 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         """Withdraw the code, and remove what the program has drawn."""
         self.stage.door.close()
         self._tape.end(STOPPED)
-        self.change(drawings=None, measured=None, program="", driven="")
-        self.stage.channel.show("driven", "")
+        self.change(drawings=None, measured=None, program="", driven="", announced=None)
+        self._show_driven()
         self.stage.status.show(Notice("hand", "The code is withdrawn", "No program can move this page with it."))

@@ -6,6 +6,7 @@ from app.live import Line
 from app.live.recording import Bounds, Recording, Track, to_csv, to_mcap
 from app.live.recording.recording import OPENED, SHOWN
 from app.viewer.feature import Stage, save_file
+from app.viewer.live.pursuit import Pursuit
 from app.viewer.panel.status import Notice
 from kin import InputError
 from kin.transforms import Array
@@ -32,6 +33,7 @@ class Tape:
         self.playing = False
         self._line: Line | None = None  # that is or was recorded
         self._track: Track | None = None
+        self._pursuit = Pursuit(stage.arm.now.robot)
 
     @property
     def running(self) -> bool:
@@ -101,7 +103,8 @@ class Tape:
     # Playing
 
     def play(self) -> None:
-        """Go on from the present time, or begin again at the end."""
+        """Go on from the present time, or begin again at the end; a driven arm first goes there."""
+        self._pursuit = Pursuit(self._stage.arm.now.robot)
         if self.time >= self.seconds:
             self.time = 0.0
         self.playing = True
@@ -114,23 +117,38 @@ class Tape:
             self._stage.arm.playing = False
 
     def advance(self, seconds: float) -> Array | None:
-        """Go on for so many seconds while it is played; returns the measured arm."""
+        """Go on for so many seconds while it is played; returns the measured arm of the recording."""
         self.time += seconds
         if self.time >= self.seconds:
             self.stop()
         return self.show(min(self.time, self.seconds))
 
-    def show(self, time: float) -> Array | None:
+    def lead(self, seconds: float, measured: Array) -> None:
+        """Lead a driven arm, measured now ``(n,)``, along what was commanded: no faster than it follows."""
+        q, _ = self._at(self.time)
+        if q is None or self._pursuit.goes_on(q, measured, seconds):
+            self.advance(seconds)
+        elif self._pursuit.begun:
+            self.show(self.time, "It waits for the arm.")
+        else:
+            self.show(self.time, "The arm goes there first, no faster than its program lets it.")
+
+    def show(self, time: float, words: str = "") -> Array | None:
         """Show the arm as it was commanded at a time; returns where it was measured."""
-        assert self.recording is not None
-        if self._track is None:
-            self._track = self.recording.track()
         self.time = time
-        q, measured = self._track.at(time)
+        q, measured = self._at(time)
+        assert self._track is not None
         opening = self._track.opening_at(time)
         if opening is not None and self._stage.arm.opening is not None:
             self._stage.arm.open_gripper(opening)
         if q is not None:
-            q = self._stage.arm.now.robot.clip(q)
-            self._stage.arm.move_to(q, Notice("hand", f"The recording at {time:.2f} s"), at_once=True)
+            self._stage.arm.move_to(q, Notice("hand", f"The recording at {time:.2f} s", words), at_once=True)
         return measured
+
+    def _at(self, time: float) -> tuple[Array | None, Array | None]:
+        """Where the arm was commanded to be, within its limits, and where it was measured."""
+        assert self.recording is not None
+        if self._track is None:
+            self._track = self.recording.track()
+        q, measured = self._track.at(time)
+        return None if q is None else self._stage.arm.now.robot.clip(q), measured

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.classroom.tokens import show_code
 from app.live import Program
+from app.live.announced import Announcement, State
 from app.viewer.live.tape import BYTES, SECONDS
 from app.viewer.panel.share import box_html
 from app.viewer.views.templates import render
@@ -60,6 +61,24 @@ def stop(name: str) -> str:
         words=f"{name} is connected.",
         more="",
         buttons=(button,),
+    )
+
+
+# The word of each state, and its symbol and CSS class.
+STATES: dict[State, tuple[str, str, str]] = {
+    "ready": ("Ready", "○", "blue"),
+    "enabled": ("Enabled", "●", "green"),
+    "stopped": ("Stopped", "■", "amber"),
+    "fault": ("Fault", "✕", "crimson"),
+}
+
+
+@lru_cache(maxsize=256)
+def announced(name: str, number: int, said: Announcement) -> str:
+    """What a program announces, for the status card; presses tell the `number`: they count for this one."""
+    state, symbol, color = STATES[said.state]
+    return render(
+        "live/announced", name=name, number=number, announced=said, state=state, symbol=symbol, color=color
     )
 
 

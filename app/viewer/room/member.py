@@ -31,6 +31,7 @@ AGAIN = 6.0  # s within which a button that needs two presses must be pressed ag
 SURE = 0.5  # s from the first press to the second; earlier ones are of a double click
 SETTLED = 0.5  # s without news of who leads after which the target is solved in this page too
 GRACE = 0.8  # s after the beginning of a lead in which a drag that is under way does not end it
+PRESS = "press"  # the act of pressing what a connected program offers
 
 
 def _any(text: str) -> str:
@@ -50,8 +51,12 @@ def act_of(key: Hashable, value: object, features: Iterable[Feature | type[Featu
         return ""
     if name == "feature":
         match key, value:
-            case ("message", *_), [Connect.key, ["stop", *_], *_]:  # a frozen student may end a connection
+            case ("message", *_), [Connect.key, ["stop" | "halt", *_], *_]:  # what is driven may always be stopped
                 return ""
+            case ("message", *_), [Connect.key, ["press" | "confirm", *_], *_]:
+                return PRESS
+            case ("feature", Connect.key, ("do", ("on_play",), *_) | ("at", *_)), _:  # a recording moves the arm
+                return name
             case ("message", *_), [pressed, *_]:
                 return name if all(feature.acts for feature in features if feature.key == pressed) else ""
         return ""

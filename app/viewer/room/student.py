@@ -16,7 +16,7 @@ from app.viewer.declared.panel import Html, Node
 from app.viewer.live.feature import Connect
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
-from app.viewer.room.member import Member, wanted
+from app.viewer.room.member import PRESS, Member, wanted
 from app.viewer.room.sharing import LED_EVERY, STUDENT_EVERY
 from app.viewer.room.submissions import Submissions
 from app.viewer.session.state import PageState
@@ -25,6 +25,7 @@ TEACHER = "teacher"
 STORED: Hashable = "stored"  # an answer is stored, or is not: the room may be as it was
 JOIN_AGAIN = " Join a room to go on; the link of this page keeps what you have done."
 FROZEN = "The teacher has frozen the class: look at the teacher’s screen."
+FOLLOWING = "Your page follows the teacher, and so would what you switch on. Press Stop following first."
 
 
 class SharedPage(NamedTuple):
@@ -290,6 +291,8 @@ class Student(Member):
             return self.room.closed + JOIN_AGAIN
         if self.frozen:
             return FROZEN
+        if self.leader and act == PRESS:
+            return FOLLOWING
         if self.leader:
             self.free()
             self._gone = True

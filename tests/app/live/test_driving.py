@@ -95,9 +95,16 @@ class Page:
     def __init__(self, robot: kin.Robot) -> None:
         self.robot, self.q = robot, robot.q_home
         self.measured = robot.q_home
+        self.announced: list[tuple[str, str, list[str]]] = []  # state, words and buttons, one after the other
 
     def stop(self) -> None:
         pass
+
+    def announce(self, words: str, buttons: Any, state: str) -> None:
+        self.announced.append((state, words, [each["name"] for each in buttons]))
+
+    def events(self) -> Iterator[Any]:
+        return iter(())
 
 
 class Rig:
@@ -106,7 +113,7 @@ class Rig:
     Attributes:
         line: the bus.
         page: what the arm follows.
-        said: why the session has ended; empty: it has had its time.
+        said: why the arm was stopped or the session has ended; empty: it has had its time.
         typed: what its owner types.
     """
 
@@ -138,6 +145,7 @@ class Rig:
         for entry in table.values():
             self.line.servos[entry["id"]].calibrate(entry)
         self.began = self.positions
+        self.page.announced.clear()
         self.typed.put(word)
         try:
             bus = Bus("/dev/ttyACM0")
@@ -145,6 +153,8 @@ class Rig:
             session.Session(self.page, bus, calibrated, self.typed, speed, seconds).run(release)
         except kin.KinematicsError as error:
             self.said = str(error)
+        stopped = [words for state, words, _ in self.page.announced if state in ("stopped", "fault")]
+        self.said = next((words.removesuffix(".") for words in stopped if words != session.HELD), self.said)
         return self
 
     @property
@@ -460,6 +470,57 @@ def test_nothing_is_written_before_the_owner_says_enable(rig, capsys):
     assert "Got 'go'. Type and press Enter:" in said
 
 
+def test_what_stops_the_arm_is_said_in_the_page_and_the_next_enable_goes_on(rig, capsys):
+    def hold(t: float) -> None:
+        rig.line.servos[1].stuck = t < 6.0
+        if t > 0.5:
+            rig.page.q = np.append(np.radians(60.0), rig.page.q[1:])
+        if t > 6.0 and len(rig.page.announced) == 3:
+            rig.typed.put("enable")
+
+    rig.clock.each = hold
+    rig.drive(CALIBRATIONS["full turn"], seconds=14.0, speed=40.0)
+    ready, enabled, stopped, again = rig.page.announced
+    assert ready == ("ready", session.MIRROR, ["enable", "release"])
+    assert enabled == ("enabled", "The arm follows this page at up to 40 deg/s.", ["stop", "release"])
+    assert stopped[0] == "stopped"
+    assert "shoulder pan is" in stopped[1]
+    assert "behind: something holds it" in stopped[1]
+    assert stopped[2] == ["enable", "release"]
+    assert again == enabled
+    assert stopped[1] in capsys.readouterr().err
+    assert degrees(CALIBRATIONS["full turn"], rig.positions)[0] == pytest.approx(60.0, abs=0.2)
+
+
+def test_a_servo_that_is_lost_meanwhile_is_a_fault_in_the_page_until_it_answers(rig):
+    def lose(t: float) -> None:
+        rig.line.missing = {4} if 0.5 < t < 2.0 else set()
+
+    rig.clock.each = lose
+    rig.drive(CALIBRATIONS["full turn"], word="")
+    assert [(state, buttons) for state, _, buttons in rig.page.announced] == [
+        ("ready", ["enable", "release"]),
+        ("fault", ["release"]),
+        ("ready", ["enable", "release"]),
+    ]
+    assert rig.page.announced[1][1] == "motor 4 (wrist_flex) does not answer. The ghost is hidden meanwhile."
+    assert rig.line.written == []
+
+
+def test_a_fault_holds_the_arm_even_where_the_end_would_release_it(rig):
+    rig.line.servos[1].stuck = True
+
+    def held(t: float) -> None:
+        shoulder(80.0)(rig)(t)
+        if t > 7.0:
+            assert all(rig.torque), "it would fall"
+
+    rig.clock.each = held
+    rig.drive(CALIBRATIONS["full turn"], seconds=8.0, speed=90.0, release=True)
+    assert "behind: something holds it" in rig.said
+    assert not any(rig.torque), "at the end"
+
+
 def test_stop_holds_the_arm_until_the_next_enable(rig):
     """It goes on from where it is then, although the page shows another place meanwhile."""
     begun = shoulder(80.0)(rig)
@@ -703,3 +764,41 @@ def test_ticks_and_joint_values_are_in_a_straight_line(drawn):
     grid = np.array([scale.ticks(low + part * (high - low)) for part in np.linspace(0.0, 1.0, 21)])
     steps = np.diff(grid, axis=0)
     assert ((steps > 0).all(axis=0) | (steps < 0).all(axis=0)).all(), "never back by a turn"
+
+
+# The simulated arm of the command
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("missing=3", r"motor 3 \(elbow_flex\) does not answer"),
+        ("kind=2", r"motor 2 \(shoulder_lift\) is of model 1284"),
+        ("overload=5,stuck=1", r"motor 5 \(wrist_roll\) reports an error: overload"),
+        ("baud=115200", "talks at 115200 baud"),
+        ("volts=12", r"gets 12\.0 V, expected 4\.0 to 8\.0 V"),
+        ("celsius=75", "is at 75 °C, expected less than 70 °C"),
+    ],
+)
+def test_a_simulated_arm_has_the_faults_that_are_asked_for(fault, words):
+    port = f"sim:{fault}"
+    bus = Bus(port)
+    robot = Calibration(None, port).applied(ARM)
+    with pytest.raises(kin.KinematicsError, match=words):
+        bus.check(robot.motors)
+
+
+def test_a_simulated_servo_that_is_stuck_answers():
+    port = "sim:stuck=1"
+    robot = Calibration(None, port).applied(ARM)
+    assert "6 servos answer at sim:stuck=1" in Bus(port).check(robot.motors)
+
+
+@pytest.mark.parametrize(
+    "fault", ["fire", "missing", "missing=7", "missing=0", "volts=-1", "baud=٣", "stuck=1,", "celsius=1e9"]
+)
+def test_a_fault_that_there_is_not_is_refused_with_what_there_is(fault):
+    with pytest.raises(
+        kin.InputError, match=r"^--port: got '?sim:.*, expected (sim, or sim: and faults of|\w+=N, )"
+    ):
+        Bus(f"sim:{fault}")

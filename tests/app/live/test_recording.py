@@ -21,6 +21,7 @@ from test_live_page import press
 import kin
 from app.live.recording import Bounds, Recording, read_mcap, save, to_mcap
 from app.live.recording import recording as module
+from app.viewer.live.pursuit import NEAR, Pursuit
 
 A, B = Q, Q + 0.2
 
@@ -206,18 +207,59 @@ def test_a_page_records_plays_and_saves(page, arm):
     page.wait(lambda: words(page) == "")
 
 
-def test_what_is_driven_is_not_moved_by_a_recording(page, arm):
+def recorded(page: FakeBrowser, arm: Any, *rows: np.ndarray) -> None:
+    """Record these configurations, and end where the last one is."""
     press(page, "Record the connection")
-    arm.q = A
-    arm.q = B
-    shown(page, kin.fk(ARM, B))
+    page.wait(lambda: words(page) == "running")
+    for q in rows:
+        arm.q = q
+        shown(page, kin.fk(ARM, q))
+        time.sleep(0.05)
     press(page, "Stop recording")
     page.wait(lambda: words(page) == "ended")
+
+
+def test_what_does_not_say_where_it_is_is_not_moved_by_a_recording(page, arm):
+    recorded(page, arm, A, B)
     arm.drives = "SO-101"
     press(page, "Play recording")
-    page.wait(lambda: "SO-101 is driven" in page.html)
+    page.wait(lambda: "It does not say where it is" in page.html)
     page.settle()
     assert page.tool_pose() == pytest.approx(kin.fk(ARM, B), abs=1e-5)
+
+
+def test_a_recording_waits_for_the_arm_that_it_drives(page, arm):
+    """It goes where the recording begins first, and stays there until it is led on."""
+    arm.q = A
+    shown(page, kin.fk(ARM, A))
+    recorded(page, arm, A, *(A + 0.2 * k for k in range(1, 4)))
+    end = A + 0.6
+    arm.measured = end
+    arm.drives = "SO-101"
+    page.set("Time (s)", 0.0)
+    page.wait(lambda: "Play recording has SO-101 go on from there." in page.html)
+    assert page.tool_pose() == pytest.approx(kin.fk(ARM, end), abs=1e-5), "the slider moves nothing"
+    press(page, "Play recording")
+    shown(page, kin.fk(ARM, A))
+    page.wait(lambda: "The arm goes there first" in page.html)
+    time.sleep(0.5)
+    assert arm.q.tolist() == pytest.approx(A.tolist()), "it waits"
+    measured, behind = end, []
+    while np.abs(arm.q - end).max() > 1e-6 or np.abs(measured - end).max() > 1e-3:
+        way = arm.q - measured
+        behind.append(np.abs(way).max())
+        measured = measured + np.clip(way, -0.02, 0.02)
+        arm.measured = measured
+        arm.drives = "SO-101"  # its sign of life
+    begun = next(k for k, gap in enumerate(behind) if gap < NEAR)
+    assert begun > 20
+    assert max(behind[begun:]) < NEAR + 0.2 + 0.02, "one step of the recording at most"
+    page.wait(lambda: "Play recording" in labels(page))
+    arm.drives = None
+    press(page, "Play recording")
+    shown(page, kin.fk(ARM, end))
+    arm.drives = "SO-101"
+    page.wait(lambda: "Pause" not in labels(page))
 
 
 def test_another_arm_ends_the_recording_of_a_page(page, arm):
@@ -228,3 +270,16 @@ def test_another_arm_ends_the_recording_of_a_page(page, arm):
     assert "another arm was shown" in page.html
     assert "It is of the UR5" in page.html
     assert "Time (s)" not in labels(page)
+
+
+def test_an_arm_that_comes_no_closer_is_not_waited_for_for_ever():
+    pursuit, far = Pursuit(ARM), Q + np.radians(12.0)
+    assert not any(pursuit.goes_on(Q, far, 0.1) for _ in range(100)), "it has not been where it begins"
+    assert pursuit.goes_on(Q, Q, 0.1)
+    waits = [pursuit.goes_on(Q, far, 0.1) for _ in range(30)]
+    assert waits == [False] * 20 + [True] * 10
+    assert not pursuit.goes_on(Q, Q + np.radians(14.0), 0.1), "it is farther behind than that"
+    coming = [pursuit.goes_on(Q, Q + np.radians(14.0 - 0.06 * k), 0.1) for k in range(170)]
+    assert coming == [False] * coming.count(False) + [True] * coming.count(True), "one that is on its way is"
+    assert 14.0 - 0.06 * coming.count(False) == pytest.approx(5.0, abs=0.1)
+    assert not pursuit.goes_on(Q, far, 0.1)

@@ -19,7 +19,8 @@ import kin
 from app.classroom import COOKIE, Attendance, Hub, Ticket
 from app.classroom.courses import Course, Item, to_data
 from app.exercises import Exercises
-from app.live import Line, Lines
+from app.live import Line, Lines, Program
+from app.live.announced import Announcement, Button
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -702,6 +703,51 @@ def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, monkeyp
     assert "welder 7" not in other.html, "the class does not see it"
     lines[0].send({"drives": None})
     teacher.wait(lambda: names() == ["Ann", "Bob"])
+
+
+@pytest.mark.full
+def test_a_member_who_may_not_act_presses_nothing_of_a_program_but_what_stops_it(
+    room: Class, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines: list[Line] = []
+    open_line = Lines.open
+
+    def opened(self: Lines, *arguments: Any) -> Line:
+        lines.append(open_line(self, *arguments))
+        return lines[-1]
+
+    monkeypatch.setattr(Lines, "open", opened)
+    buttons = Button("weigh", "Weigh"), Button("enable", "Enable", "It moves."), Button("stop", "Stop", stops=True)
+
+    def heard(*presses: str) -> list[str]:
+        """What the program hears when the student presses these."""
+        number = int(student.html.split('data-argument="')[1].split('"')[0])
+        kinds = {each.name: each.event for each in buttons}
+        for k, name in enumerate(presses):
+            student.say("feature", ["connect", [kinds[name], name, len(student.log) + k], number])
+        student.settle()
+        return [reply.pressed for reply in lines[0].replies() if reply.pressed]
+
+    teacher, (student, _) = room.teacher(), room.join("Ann")
+    student.set("Connect a program", True)
+    student.wait(lambda: "data-live-code" in student.html)
+    lines[0].connect(Program("arm.py", "1", lambda: None))
+    lines[0].send({"announce": Announcement("It waits.", "ready", buttons)})
+    student.wait(lambda: 'data-announced="ready"' in student.html)
+    everything = ["weigh", "enable", "stop"]
+    assert heard(*everything) == everything
+    press(teacher, "freeze")
+    student.wait(lambda: "data-class-frozen" in student.html)
+    assert heard(*everything) == ["stop"]
+    assert "has frozen the class" in student.html
+    press(teacher, "freeze")
+    student.wait(lambda: "data-class-frozen" not in student.html)
+    press(teacher, "follow")
+    mode(student, "led")
+    assert heard(*everything) == ["stop"]
+    assert "Press Stop following first." in student.html
+    assert bar(student) == "led", "the lead goes on"
+    assert 'data-announced="' not in teacher.html, "the buttons are those of the page that is connected"
 
 
 @pytest.mark.full
