@@ -4,7 +4,8 @@
     python scripts/screenshots.py http://127.0.0.1:8765/ [NAME …]
 
 Each picture is a link that restores a view, and the tab of the panel to open; *wall* is a class, which is opened
-and ended. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
+and ended, *so101* a simulated arm, which follows its page. Needs what the browser tests need: playwright, Chromium
+(KINBOARD_TEST_CHROMIUM) and pillow.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import base64
 import io
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -61,7 +63,7 @@ SHOTS = (
 )
 
 
-WALL = "wall"
+WALL, SO101 = "wall", "so101"
 PROJECTOR = {"width": 1920, "height": 1080}
 TASK = "which-joint-goes-down"
 RIGHT, WRONG = 2, 0  # of its choices
@@ -147,6 +149,33 @@ def take_wall(browser: Browser, address: str) -> Image.Image:
     return image
 
 
+def take_so101(browser: Browser, address: str) -> Image.Image:
+    """Enable a simulated arm in its page, and photograph it on its way."""
+    page = browser.new_page(viewport=SIZE, color_scheme="light")
+    page.set_default_timeout(WAIT)
+    page.add_init_script('localStorage.setItem("kinboard-hints", "drag joint learn")')
+    page.goto(link(address, {"robot": "so101"}))
+    arrive(page)
+    page.get_by_role("tab", name="Program").click(force=True)
+    page.get_by_role("button", name="Connect a program").click()
+    code = page.locator("[data-live-code]").inner_text()
+    words = ["so101", "--port", "sim", "--speed", "8", "--code", code, "--address", address]
+    with subprocess.Popen([sys.executable, "-m", "app.cli", *words], cwd=FOLDER.parents[1]) as arm:
+        page.get_by_role("tab", name="Move").click(force=True)
+        page.locator("[data-confirm]").first.click()
+        page.locator("#kb-confirm [data-guide-do]").click()
+        expect(page.locator("[data-announced=enabled]").first).to_be_visible()
+        field = page.locator(".kb-field input").first
+        field.fill("40")
+        field.press("Enter")
+        page.mouse.move(5, 5)
+        page.wait_for_timeout(2000)
+        image = Image.open(io.BytesIO(page.screenshot(timeout=WAIT)))
+        arm.terminate()
+    page.close()
+    return image
+
+
 def take(page: Page, address: str, shot: Shot) -> Image.Image:
     """Open the view, wait until it stands still, and photograph it."""
     page.goto(link(address, shot.state))
@@ -176,6 +205,8 @@ def main(address: str, names: list[str]) -> None:
             page.close()
         if not names or WALL in names:
             save(take_wall(browser, address), WALL)
+        if not names or SO101 in names:
+            save(take_so101(browser, address), SO101)
         browser.close()
 
 

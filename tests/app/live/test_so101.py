@@ -425,3 +425,47 @@ def test_the_simulated_arm_is_shown_and_driven(viewer, page, typed, patient, cap
     said += capsys.readouterr().out
     assert "The arm holds its place" in said
     page.settle()
+
+
+@pytest.mark.full
+def test_the_owner_enables_replays_stops_and_releases_from_the_page(viewer, page, typed, patient):
+    def pressed(event: str, name: str) -> None:
+        number = re.findall(rf'data-question-key="{name}" data-argument="(\d+)"', page.html)[0]
+        page.say("feature", ["connect", [event, name, len(page.log)], int(number)])
+
+    def button(label: str) -> None:
+        page.send("GuiUpdateMessage", uuid=page.element(label), updates={"value": True})
+
+    def at(degrees: float) -> bool:
+        return bool(measured(page)) and abs(measured(page)[0] - degrees) < 1.0
+
+    page.choose(ARM.name)
+    started = ExampleRun(so101, viewer, page, ["--port", "sim", "--speed", 60])
+    page.wait(lambda: 'data-announced="ready"' in page.html)
+    assert "at up to 60 deg/s. Keep its power switch within reach." in page.html
+    pressed("confirm", "enable")
+    page.wait(lambda: 'data-announced="enabled"' in page.html)
+    page.wait(lambda: page.shown["stop"] == ["stop", "Stop"])
+    begins = measured(page)[0]
+    button("Record the connection")
+    time.sleep(1.0)  # how long the arm stays there when it is replayed
+    page.set("1 shoulder pan", begins + 40.0)
+    page.wait(lambda: at(begins + 40.0))
+    button("Stop recording")
+    page.wait(lambda: 'data-live-recording="ended"' in page.html)
+    button("Play recording")
+    page.wait(lambda: at(begins))
+    page.wait(lambda: at(begins + 40.0))
+    pressed("halt", "stop")
+    page.wait(lambda: 'data-announced="stopped"' in page.html and page.shown["driven"] == "")
+    pressed("confirm", "release")
+    page.wait(lambda: "The motors are off." in page.html)
+    typed.put("quit")
+    started.wait()
+    assert started.codes == [0]
+    page.settle()
+
+
+def test_the_help_states_the_default_speed(capsys):
+    assert main(["so101", "--help"]) == 0
+    assert f"(default {driving.SLOW:g})" in " ".join(capsys.readouterr().out.split())
