@@ -120,6 +120,16 @@ def tab(browser: Browser, file: Path, bus: SerialBus) -> Iterator[Page]:
     assert said == []
 
 
+@pytest.fixture(scope="module")
+def scripts(browser: Browser, file: Path) -> Iterator[Page]:
+    """A page for its functions alone."""
+    page = browser.new_page()
+    page.add_init_script(BLIND)
+    page.goto(file.as_uri())
+    yield page
+    page.close()
+
+
 def pressed(tab: Page, name: str) -> None:
     tab.get_by_role("button", name=name, exact=True).click()
 
@@ -225,14 +235,14 @@ def test_broken_answers_are_asked_for_again(tab, bus, line):
     assert "motor 1 (shoulder_pan) answers with broken packets only" in tab.evaluate(ON_BUS, [act, motors_of()])
 
 
-def test_the_bounds_are_those_of_driving(tab):
-    bounds = tab.evaluate("(({ ANSWER, ...others }) => others)(kinboardServos.BOUNDS)")
+def test_the_bounds_are_those_of_driving(scripts):
+    bounds = scripts.evaluate("(({ ANSWER, ...others }) => others)(kinboardServos.BOUNDS)")
     expected = {name: getattr(driving, name) for name in ("SAME", "LATEST", "BEHIND", "PATIENCE", "AWAY")}
     expected |= {"MARGIN": MARGIN, "CYCLE": session.CYCLE, "RESTING": session.RESTING}
     assert bounds == pytest.approx(expected)
 
 
-def test_ticks_become_the_same_joint_values(tab):
+def test_ticks_become_the_same_joint_values(scripts):
     rng = np.random.default_rng(7)
     for _ in range(100):
         ranges = {
@@ -251,7 +261,7 @@ def test_ticks_become_the_same_joint_values(tab):
         ticks = np.array([float(rng.integers(*motor.range)) for motor in calibrated])
         expected = Scale(robot, calibrated, ticks)
         q = [rng.uniform(low, high) for low, high in zip(*expected.limits, strict=True)]
-        found = tab.evaluate(
+        found = scripts.evaluate(
             """([motors, ticks, q]) => {
               const scale = new kinboardServos.Scale(motors, ticks);
               return [scale.q(ticks), scale.limits, scale.ticks(q)];
@@ -285,7 +295,7 @@ class Shown:
 
 
 @pytest.mark.parametrize("fault", ["none", "stuck", "pushed"])
-def test_the_arm_is_led_as_the_guide_leads_it(tab, monkeypatch, fault):
+def test_the_arm_is_led_as_the_guide_leads_it(scripts, monkeypatch, fault):
     """Step by step, with readings that lag, noise, pauses and commands out of all limits."""
     clock, rng = Clock(), np.random.default_rng(5)
     monkeypatch.setattr(driving, "time", clock)
@@ -313,7 +323,7 @@ def test_the_arm_is_led_as_the_guide_leads_it(tab, monkeypatch, fault):
             break
     limits = np.transpose(limits).tolist()
     given = {"motors": motors_of(), "measured": q.tolist(), "limits": limits, "speed": np.radians(60.0)}
-    found = tab.evaluate(GUIDED, given | {"steps": steps})
+    found = scripts.evaluate(GUIDED, given | {"steps": steps})
     assert found[-1] == expected[-1] if fault != "none" else isinstance(found[-1], list)
     moved = [row for row in found if isinstance(row, list)]
     assert np.array(moved) == pytest.approx(np.array(expected[: len(moved)]), abs=1e-9)
