@@ -270,7 +270,7 @@ def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is
 
 
 @pytest.mark.full
-def test_who_may_only_look_is_told_of_the_keys_that_work_then(browser: Browser, read_only_address: str) -> None:
+def test_who_may_only_look_sees_the_keys_that_work_then(browser: Browser, read_only_address: str) -> None:
     page = browser.new_page()
     page.add_init_script(BLIND)
     page.goto(read_only_address + "viewer/")

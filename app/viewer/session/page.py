@@ -133,7 +133,7 @@ class VisitorPage(Worker):
         )
         self.looks = Looks(self)
         self.live = LiveInput(self)
-        self._told: Arm | None = None  # the arm that features have heard of
+        self._heard_of: Arm | None = None  # the arm that features have heard of
         self._actions = Actions(self, self.live, self.looks)
 
     @property
@@ -175,8 +175,8 @@ class VisitorPage(Worker):
 
     def _tell(self) -> None:
         """Tell every feature that the arm is another one, if it is."""
-        if self.arm.now is not self._told:
-            self._told = self.arm.now
+        if self.arm.now is not self._heard_of:
+            self._heard_of = self.arm.now
             self.for_features(lambda feature: feature.on_arm_changed())
 
     # Reports of the page's parts

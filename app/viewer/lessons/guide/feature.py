@@ -105,7 +105,6 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self._sheets: dict[str, Sheet] = {}
         self._example = ExampleView(stage, self._example_text)
         self.shown: Lesson | None = None
-        self._drawn_answer: Sequence[Node] = ()  # as the steps on show have it
         super().__init__(stage)
         self.shown = lesson(stage)
         self._follow_steps()
@@ -161,9 +160,9 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         """Where the last answer to the step on show leads, and the frame that is placed for a question."""
         framed = next((key for key, asked in self._forms.items() if asked.form == "frame"), None)
         if framed is None:
-            return self._drawn_answer
+            return self._answer_nodes()
         reach = self.stage.arm.now.robot.reach
-        return [*self._drawn_answer, own_frame(self._sheet(framed).ghost, reach)]
+        return [*self._answer_nodes(), own_frame(self._sheet(framed).ghost, reach)]
 
     # Events
 
@@ -441,7 +440,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
             activity.pass_lesson(self._lesson.key, self.arm.id, answers.arm_ids)
         if any(asked.form == "posture" for asked in self._forms.values()):
             self.change(joints=True)
-        nodes = self._drawn_answer = self._answer_nodes()
+        nodes = self._answer_nodes()
         points = np.concatenate([ends(nodes), self._ghost_room()])
         room = points if len(points) else None
         if not same((room,), (self.settings.room,)):
