@@ -1,11 +1,8 @@
-"""A worked example with its values: poses, words, and the player that goes from step to step.
-
-It knows no page. Time is `time.perf_counter`'s.
-"""
+"""A worked example with its values: poses, words, and how far it has come. It knows no page."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -115,21 +112,20 @@ def _line(robot: Robot, start: Array, end: Array) -> Array:
     return found
 
 
+@dataclass(frozen=True, eq=False)
 class Player:
-    """Goes through an example.
+    """How far an example has come.
 
     Attributes:
         at: the index of the step on show.
         playing: whether it goes on by itself after this step.
+        moved: the share of the time of its motion that is over.
     """
 
-    def __init__(self, example: Example, now: float) -> None:
-        self.example = example
-        self.at = 0
-        self.playing = True
-        self._share = 0.0
-        self._last, self._rest_until = now, now
-        self._begin(now)
+    example: Example
+    at: int = 0
+    playing: bool = True
+    moved: float = 0.0
 
     @property
     def step(self) -> ExampleStep:
@@ -139,63 +135,46 @@ class Player:
     @property
     def arrived(self) -> bool:
         """Whether the motion of the step is at its end."""
-        return self._share == 1.0
+        return self.moved == 1.0 or not self.step.moves
 
     @property
     def share(self) -> float:
         """The share of the way that is behind, which begins and ends gently."""
-        return self._share * self._share * (3.0 - 2.0 * self._share)
+        moved = 1.0 if self.arrived else self.moved
+        return moved * moved * (3.0 - 2.0 * moved)
 
     @property
     def is_last(self) -> bool:
         """Whether there is no further step."""
         return self.at == len(self.example.steps) - 1
 
-    def toggle(self, now: float) -> None:
-        """Pause or go on; at the end, begin anew."""
-        if not self.playing and self.is_last and self.arrived:
-            self.at = 0
-            self._begin(now)
-        self.playing = not self.playing
-        self._last = self._rest_until = now
+    @property
+    def goes_on(self) -> bool:
+        """Whether the next step follows by itself, after `rest`."""
+        return self.playing and not self.is_last
 
-    def turn(self, way: int, now: float) -> None:
-        """Pause, and go to the next step, of which the motion is shown, or to the end of the one before."""
+    @property
+    def rest(self) -> float:
+        """Seconds of rest at the end of the step, to let its words be read."""
+        return REST + PER_LETTER * len(self.step.text + self.step.then)
+
+    def toggled(self) -> Player:
+        """Paused, or going on; at the end, at its beginning again."""
+        if self.is_last and self.arrived:
+            return Player(self.example)
+        return replace(self, playing=not self.playing)
+
+    def turned(self, way: int) -> Player:
+        """Paused at the next step, of which the motion is shown, or at the end of the one before."""
         at = self.at + way
-        self.playing = False
         if not 0 <= at < len(self.example.steps):
-            return
-        self.at = at
-        self._begin(now)
-        if way < 0:
-            self._share = 1.0
+            return replace(self, playing=False)
+        return replace(self, at=at, moved=0.0 if way > 0 else 1.0, playing=False)
 
-    def use(self, example: Example) -> None:
-        """Go on with the same example in other units."""
-        self.example = example
+    def followed(self) -> Player:
+        """At the next step."""
+        return replace(self, at=self.at + 1, moved=0.0)
 
-    def advance(self, now: float) -> float | None:
-        """Go on until now; returns in how many seconds something changes next, None: nothing does."""
-        passed = min(max(now - self._last, 0.0), PATIENCE)
-        self._last = now
-        if not self.arrived:
-            self._share = min(1.0, self._share + passed / MOTION_TIME)
-            if self.arrived:
-                self._rest(now)
-            return 0.0
-        if not self.playing or self.is_last:
-            self.playing = False
-            return None
-        if now < self._rest_until:
-            return self._rest_until - now
-        self.at += 1
-        self._begin(now)
-        return 0.0
-
-    def _begin(self, now: float) -> None:
-        self._last = now
-        self._share = 0.0 if self.step.moves else 1.0
-        self._rest(now)
-
-    def _rest(self, now: float) -> None:
-        self._rest_until = now + REST + PER_LETTER * len(self.step.text + self.step.then)
+    def after(self, seconds: float) -> Player:
+        """Later, in the motion of the step."""
+        return replace(self, moved=min(1.0, self.moved + seconds / MOTION_TIME))

@@ -29,7 +29,7 @@ from app.viewer.feature import Stage
 from app.viewer.lessons.guide import views
 from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
 from app.viewer.lessons.guide.answers import Answers
-from app.viewer.lessons.guide.example_view import ExampleView
+from app.viewer.lessons.guide.example_view import WorkedExample
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Pose
 from app.viewer.lessons.guide.progress import Progress
@@ -103,7 +103,6 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self._lesson, self._following, self._left = lesson, following, state or {}
         self._answers = Answers(stage, lesson)
         self._sheets: dict[str, Sheet] = {}
-        self._example = ExampleView(stage, self._example_text)
         self.shown: Lesson | None = None
         super().__init__(stage)
         self.shown = lesson(stage)
@@ -111,6 +110,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self.refresh()
 
     def built(self) -> None:
+        self._example = self.adopt(WorkedExample(self.stage, self, lambda: self._example_text, self.schedule))
         self._take(self._left)
 
     def begin(self, keep_arm: bool = False) -> None:
@@ -250,22 +250,8 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self._follow_steps()
         super().on_robot()
 
-    def on_arm_changed(self) -> None:
-        if self._example.on_arm_changed():
-            self.schedule()
-        super().on_arm_changed()
-
-    def tick(self, now: float) -> None:
-        before = self._example.words
-        wait = self._example.advance(now)
-        if self._example.words != before:
-            self.schedule()
-        super().tick(now)
-        self.due = min((one for one in (self.due, wait) if one is not None), default=None)
-
     def on_style(self) -> None:
         self._answers.reword()
-        self._example.on_style(self._example_text)
         self._sheets.clear()
         self._follow_steps()
         super().on_style()
@@ -276,7 +262,7 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self.due = 0.0
 
     def state(self) -> dict[str, object]:
-        return {**self._answers.state(), **super().state()}
+        return {**self._answers.state(), **self.settings.state()}
 
     def restore(self, state: dict[str, object]) -> None:
         self._example.close()
@@ -285,7 +271,6 @@ class Guide(DeclaredFeature[GuideSettings, Facts[GuideSettings]]):
         self._begin()
 
     def remove(self) -> None:
-        self._example.close()
         if self.settings.room is not None:
             self._see_through(False)
         if self.settings.joints:

@@ -33,7 +33,7 @@ def goal_html(lesson: str, outline: Outline) -> str:
 
 
 def example_html(title: str, *going: object) -> str:
-    """The button of the worked example; while it is on show, what it has come to (`ExampleView.words`)."""
+    """The button of the worked example; while it is on show, what it has come to (`WorkedExample.words`)."""
     names = "step", "at", "count", "arrived", "playing"
     return render("guide/example", title=title, player=dict(zip(names, going, strict=False)))
 

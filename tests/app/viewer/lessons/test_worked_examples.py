@@ -24,7 +24,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.example import MOTION_TIME, PATIENCE, Example, ExampleStep, Player, example_of
+from app.viewer.lessons.guide.example import REST, Example, ExampleStep, Player, example_of
 from app.viewer.lessons.guide.example_drawing import walked
 from app.viewer.panel.joints import label
 from app.viewer.server import ViewerServer
@@ -365,45 +365,44 @@ def test_other_units_change_nothing_but_the_numbers(key: str) -> None:
 
 
 def test_the_player_shows_each_motion_rests_and_ends() -> None:
-    player, now, seen = Player(example_in("velocity"), 0.0), 0.0, []
-    while (wait := player.advance(now)) is not None:
-        now += max(wait, 0.02)
+    player = Player(example_in("velocity"))
+    seen = [(player.at, player.arrived)]
+    while player.goes_on or not player.arrived:
+        player = player.followed() if player.arrived else player.after(0.02)
         seen.append((player.at, player.arrived))
     moving = [(number, arrived) for number in range(6) for arrived in (False, True)]
     assert [at for at, _ in itertools.groupby(seen)] == [at for at in moving if at not in [(0, False), (3, False)]]
-    assert not player.playing
-    player.toggle(now)
+    player = player.toggled()
     assert (player.at, player.playing) == (0, True), "again from the beginning"
 
 
 def test_turning_pages_pauses_and_back_shows_the_end_of_a_step() -> None:
-    player = Player(example_in("velocity"), 0.0)
-    player.turn(1, 0.0)
+    player = Player(example_in("velocity")).turned(1)
     assert (player.at, player.playing, player.arrived, player.share) == (1, False, False, 0.0)
     shares = [player.share]
-    for frame in range(1, 200):
-        player.advance(0.02 * frame)
+    for _ in range(1, 200):
+        player = player.after(0.02)
         shares.append(player.share)
     assert shares == sorted(shares)
     assert player.arrived
-    assert player.at == 1, "it waits for the visitor"
-    player.turn(1, 4.0)
-    player.turn(-1, 4.0)
+    assert not player.goes_on, "it waits for the visitor"
+    player = player.turned(1).turned(-1)
     assert (player.at, player.arrived) == (1, True)
-    player.turn(-1, 4.0)
-    player.turn(-1, 4.0)
+    player = player.turned(-1).turned(-1)
     assert player.at == 0
     for _ in range(20):
-        player.turn(1, 4.0)
+        player = player.turned(1)
     assert player.is_last
 
 
-def test_after_a_long_pause_it_goes_on_without_a_jump() -> None:
-    player = Player(example_in("velocity"), 0.0)
-    player.turn(1, 0.0)
-    player.advance(1000.0)
-    part = PATIENCE / MOTION_TIME
-    assert player.share == pytest.approx(part * part * (3 - 2 * part))
+def test_words_that_are_longer_are_shown_longer() -> None:
+    player = Player(example_in("velocity"))
+    rests = {len(player.step.text + player.step.then): player.rest}
+    while not player.is_last:
+        player = player.turned(1)
+        rests[len(player.step.text + player.step.then)] = player.rest
+    assert min(rests.values()) >= REST
+    assert [rests[length] for length in sorted(rests)] == sorted(rests.values())
 
 
 # The page
