@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Final
 
 from kin import IKOptions, JointConstraints, Obstacle, Robot, fk, link_frames
 from kin.collision import Contact
 from kin.collision.contacts import surroundings
 from kin.ik import Task
 from kin.transforms import Array
+
+# Arms with fewer than six joints cannot match every pose. They then match point and approach direction exactly,
+# and the status line reports the roll error: that is worth seeing, and the choice of another task is one click
+# away.
+DEFAULT_TASK: Final[Task] = "pose"
 
 
 @lru_cache(maxsize=256)
@@ -48,7 +54,7 @@ class Arm:
     q: Array
     goal: Array
     target: Array | None = None
-    task: Task = "pose"
+    task: Task = DEFAULT_TASK
     branch: str | None = None
     locks: tuple[bool, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()

@@ -21,17 +21,17 @@ from app.viewer.activity.activity import Activity
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.meshes.reader import ClientMeshes
 from app.viewer.own_arm import clean
+from app.viewer.page.controller import ArmController
 from app.viewer.page.display import Display
 from app.viewer.page.joints import Joints
 from app.viewer.page.links import Links
 from app.viewer.page.picture import Picture
 from app.viewer.page.robots import Robots
+from app.viewer.page.services import Services
 from app.viewer.panel.fence import Fence
+from app.viewer.panel.part import Shows
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.scene.camera import Sphere, VisitorCamera
-from app.viewer.session.channel.channel import Channel
-from app.viewer.session.controller import ArmController
-from app.viewer.session.services import Services
 from kin import IKResult, InputError
 from kin.collision import Contact
 
@@ -47,7 +47,7 @@ class Stage(Protocol):
         client: the visitor's browser tab: its ``gui``, ``scene`` and ``camera``.
         arm: the arm on show: ``arm.now`` is what it is at one moment; the methods move it and change its request.
         robots: the robot on show, and the visitor's own arm.
-        display: units, colours, the choices of the tab *View*, workpieces.
+        display: units, colours, workpieces.
         status: the status line.
         camera: from where the scene is looked at, unless the visitor chooses.
         picture: what of the scene is in the picture, and its legend.
@@ -58,7 +58,6 @@ class Stage(Protocol):
         activity: what is open, and what is withheld.
         meshes, bodies: reads meshes; which body each arm has.
         door: the line to a program, if there is one.
-        channel: shows values to the page's own scripts.
         fence: shows which values of controls have crossed on the way.
     """
 
@@ -77,8 +76,11 @@ class Stage(Protocol):
     meshes: ClientMeshes
     bodies: Bodies
     door: Listener
-    channel: Channel
     fence: Fence
+
+    @property
+    def channel(self) -> Shows:
+        """Shows values to the page's own scripts, by their keys."""
 
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event for the worker; thread-safe. A newer value replaces a queued one of the same key."""

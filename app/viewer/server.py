@@ -30,13 +30,13 @@ from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.meshes.library.library import Library
 from app.viewer.meshes.reader import MeshReader
+from app.viewer.page.services import Services
 from app.viewer.panel.status import LOOKING, READY, Notice
 from app.viewer.panel.theme import configure_theme
 from app.viewer.room.page import ClassroomPage
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
 from app.viewer.session.page import VisitorPage
-from app.viewer.session.services import Services
 from app.viewer.viser_patches import (
     cache_type_hints,
     keep_sent_values,

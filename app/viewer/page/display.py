@@ -1,11 +1,10 @@
-"""How a page shows things: its units, its colours, the choices of the tab *View*, and the frame of its poses."""
+"""How a page shows things: its units, its colours, and the frame of its poses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from app.viewer.frames import Frames
-from app.viewer.session.choices import ViewState
 from kin.units import DEFAULT_UNITS, Units
 
 
@@ -17,22 +16,15 @@ class Display:
 
     Attributes:
         units: of angles and lengths.
-        view: the choices of the tab *View*.
-        system_dark: whether the visitor's system is dark.
+        dark: whether the page is dark.
         frames: the workpieces, and the frame in which poses are shown.
     """
 
     def __init__(self, reframed: Callable[[], None]) -> None:
         self._reframed = reframed
         self.units: Units = DEFAULT_UNITS
-        self.view = ViewState()
-        self.system_dark = False
+        self.dark = False
         self.frames = Frames()
-
-    @property
-    def dark(self) -> bool:
-        """Whether the page is dark."""
-        return self.system_dark if self.view.dark is None else self.view.dark
 
     def use_frames(self, frames: Frames) -> None:
         """Take these frames, and show poses in the chosen one."""

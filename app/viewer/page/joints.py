@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import viser
 
+from app.viewer.page.controller import ArmController
 from app.viewer.page.display import Display
 from app.viewer.panel import Post
 from app.viewer.panel.fence import Fence
 from app.viewer.panel.joints import JointSliders
-from app.viewer.session.controller import ArmController
 
 
 class Joints:

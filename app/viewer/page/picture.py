@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.viewer.page.controller import ArmController
 from app.viewer.panel import update_html
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import VisitorCamera
 from app.viewer.scene.chain import center_line
-from app.viewer.session.controller import ArmController
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import SceneFilter
 from kin.transforms import Array

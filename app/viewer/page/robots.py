@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from app.shared.store import Store
 from app.viewer.own_arm import OwnArm
-from app.viewer.session.controller import ArmController
+from app.viewer.page.controller import ArmController
 from kin import Robot
 from kin.transforms import Array
 

@@ -120,9 +120,9 @@ class Follower:
 
     def _show_view(self, state: PageState) -> None:
         page = self._page
-        own = page.display.view
+        own = page.view
         view = replace(state.view, dark=own.dark, detailed=own.detailed, language=own.language)
-        if view != page.display.view:
+        if view != page.view:
             page.looks.use_view(view)
         if state.frames != page.display.frames:
             page.display.use_frames(state.frames)

@@ -9,8 +9,8 @@ import viser
 
 from app.classroom.attendance import Attendance
 from app.classroom.views import Ticket
+from app.viewer.page.services import Services
 from app.viewer.session.page import VisitorPage
-from app.viewer.session.services import Services
 from app.viewer.session.state import PageState
 
 

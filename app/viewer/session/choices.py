@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from app.viewer.arm import DEFAULT_TASK
 from app.viewer.declared.fields import Settings, choice, flag, part
 from app.viewer.scene.arm.looks import AxesShown, Look
 from kin.ik import Task
@@ -16,10 +17,6 @@ JOINT_AXES: Final[dict[str, AxesShown]] = {"On skeletons": True, "On every arm":
 LOOKS: Final[dict[str, Look]] = {"Body": "body", "Skeleton": "skeleton", "Both": "both"}
 AXES: Final = {"Tool axes": False, "Base axes": True}
 TASKS: Final[dict[str, Task]] = {"Full pose": "pose", "Point + approach": "approach", "Point only": "position"}
-# Arms with fewer than six joints cannot match every pose. They then match point and approach direction exactly,
-# and the status line reports the roll error: that is worth seeing, and the choice of another task is one click
-# away.
-DEFAULT_TASK: Final[Task] = "pose"
 TASK_HINT = (
     "Full pose: the position and orientation of the tool. "
     "Point + approach: the tool point and the direction of the tool's z axis; any roll. "
@@ -97,6 +94,10 @@ class ViewState(Settings):
         undo="Language",
         anything=True,
     )
+
+    def is_dark(self, system: bool) -> bool:
+        """Whether the page is dark on a system that is, or is not."""
+        return system if self.dark is None else self.dark
 
     @property
     def rotations(self) -> Rotations:

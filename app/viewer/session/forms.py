@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from app.viewer.labels import TEXT_SIZES
 from app.viewer.panel import Post
 from app.viewer.panel.layout import Panel
 from app.viewer.scene.viewpoints import SIDES
-from app.viewer.session.choices import PageChoices
+from app.viewer.session.choices import PageChoices, ViewState
 from app.viewer.views.templates import render
 from kin import InputError, Robot
 
@@ -26,13 +26,20 @@ class Forms:
     ``("recall",)``, ``("camera",)``, ``("fit-arm",)`` and ``("look-from", side)``.
 
     Args:
+        view: gives the choices of the tab *View*.
         detailed: the robots that have a detailed body; a choice of it only if there are some.
     """
 
     def __init__(
-        self, gui: viser.GuiApi, panel: Panel, page: Stage, detailed: Sequence[Robot], post: Post
+        self,
+        gui: viser.GuiApi,
+        panel: Panel,
+        page: Stage,
+        view: Callable[[], ViewState],
+        detailed: Sequence[Robot],
+        post: Post,
     ) -> None:
-        self._page, self._post = page, post
+        self._page, self._view, self._post = page, view, post
         self._nodes: dict[str, Sequence[Node]] = {
             "view": _view(detailed),
             "target": _target(),
@@ -72,14 +79,13 @@ class Forms:
             return ()
         spec: Any = PageChoices.spec("view.language")
         offered = {name: code for code, name in lessons.languages.items()}
-        chosen = lessons.spoken(self._page.display.view.language)
+        chosen = lessons.spoken(self._view().language)
         return [Control("view.language", spec=spec.narrowed(offered), value=chosen)]
 
     @property
     def _choices(self) -> PageChoices:
-        display = self._page.display
-        units, task = display.units, self._page.arm.task
-        return PageChoices(not units.degrees, units.length, task, display.view)
+        units, task = self._page.display.units, self._page.arm.task
+        return PageChoices(not units.degrees, units.length, task, self._view())
 
     def _forward(self, place: str, key: Hashable, value: object) -> None:
         match key:

@@ -31,7 +31,7 @@ class Looks:
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "body": self.use_library,
-            "system-dark": lambda dark: self.use_colours(page.display.view.dark, bool(dark)),
+            "system-dark": lambda dark: self.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(page.arm.scene.body, page.arm.now.goal_points, True),
             "fit-arm": self._fit,
             "look-from": self._look_from,
@@ -58,7 +58,8 @@ class Looks:
         """Make the page dark or light; None: as the visitor's system is."""
         page = self._page
         display, before = page.display, page.display.dark
-        display.view, display.system_dark = replace(display.view, dark=dark), system_dark
+        page.view, page.system_dark = replace(page.view, dark=dark), system_dark
+        display.dark = page.view.is_dark(system_dark)
         if display.dark != before:
             configure_theme(page.client.gui, display.dark)
             page.for_features(lambda feature: feature.on_style())
@@ -67,12 +68,11 @@ class Looks:
     def use_view(self, view: ViewState) -> None:
         """Show the page and the scene as `view` says."""
         page = self._page
-        display, before = page.display, page.display.view
-        display.view = replace(view, dark=before.dark)
+        before, page.view = page.view, replace(view, dark=page.view.dark)
         if view.base_axes != before.base_axes:
             page.arm.use_base_axes(view.base_axes)
         if view.dark != before.dark:
-            self.use_colours(view.dark, display.system_dark)
+            self.use_colours(view.dark, page.system_dark)
         if view.detailed != page.bodies.detailed:
             page.bodies.detailed, page.bodies.last_refusal = view.detailed, ""
             self.redraw_body()
@@ -105,12 +105,12 @@ class Looks:
     def apply(self) -> None:
         """Show the scene as the page's view says."""
         page, scene, display = self._page, self._page.arm.scene, self._page.display
-        page.arm.avoid_collisions(display.view.avoid)
-        scene.show_as(display.view.look)
+        page.arm.avoid_collisions(page.view.avoid)
+        scene.show_as(page.view.look)
         page.panel.gripper.offer(scene.opened)
-        scene.show_frames(display.view.frames)
-        scene.show_labels(display.view.labels)
-        scene.show_axes(display.view.axes)
+        scene.show_frames(page.view.frames)
+        scene.show_labels(page.view.labels)
+        scene.show_axes(page.view.axes)
         scene.floor.use_dark(display.dark)
         scene.floor.use_units(display.units)
 
@@ -137,7 +137,7 @@ class Looks:
 
     def _on_view(self, place: str, path: str, serial: int, value: object) -> None:
         page = self._page
-        before, chosen = page.display.view, page.forms.read(place, path, serial, value)
+        before, chosen = page.view, page.forms.read(place, path, serial, value)
         if chosen.units != page.display.units:
             self.use_units(chosen.units)
         if chosen.view != before:

@@ -3,7 +3,7 @@
 Browser callbacks post events into the inbox and return. The worker takes all new events, processes them, and sends
 one consistent update. While the arm moves it also wakes up for each frame. Nothing is shared or locked here.
 
-The arm itself belongs to the :class:`~app.viewer.session.controller.ArmController`.
+The arm itself belongs to the :class:`~app.viewer.page.controller.ArmController`.
 """
 
 from __future__ import annotations
@@ -25,11 +25,13 @@ from app.viewer.labels import size_labels, text_factor
 from app.viewer.live.feature import Connect
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.obstacles.feature import ObstaclesFeature
+from app.viewer.page.controller import ArmController
 from app.viewer.page.display import Display
 from app.viewer.page.joints import Joints
 from app.viewer.page.links import Links
 from app.viewer.page.picture import Picture
 from app.viewer.page.robots import Robots
+from app.viewer.page.services import Services
 from app.viewer.panel.fence import Fence
 from app.viewer.panel.joints import lock_notice
 from app.viewer.panel.layout import LEARN, Panel
@@ -41,7 +43,7 @@ from app.viewer.scene.camera import VisitorCamera
 from app.viewer.session.actions.actions import Actions
 from app.viewer.session.channel.channel import Channel
 from app.viewer.session.channel.files import Files
-from app.viewer.session.controller import ArmController
+from app.viewer.session.choices import ViewState
 from app.viewer.session.events import FENCE, name_of
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
@@ -51,8 +53,7 @@ from app.viewer.session.numbers import Numbers
 from app.viewer.session.palette import Palette
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
-from app.viewer.session.services import Services
-from app.viewer.session.state import PageState
+from app.viewer.session.state import PageState, encode_features
 from app.viewer.session.worker.worker import Worker
 from app.viewer.step_out import StepOut
 from app.viewer.tabs import TABS
@@ -102,7 +103,8 @@ class VisitorPage(Worker):
         self.arm = ArmController(client, services.pace, self.post, self)
         self.robots = Robots(services.store, self.arm, self._change_robot)
         self.display = Display(self._frames_changed)
-        self.links = Links(token)
+        self.view, self.system_dark = ViewState(), False
+        self.links = Links(token, encode_features)
         self.channel = Channel(self.post, rights, viser_names.MARKS.is_there)
         hear_marks(client, self.channel.mark)
         self.fence = Fence(client, lambda: self.post(FENCE))
@@ -331,9 +333,10 @@ class VisitorPage(Worker):
         gui = self.client.gui
         saved = self._persistence.stored
         display = self.display
-        display.units, display.view, display.frames = saved.units, saved.view, saved.frames
-        display.system_dark = self._persistence.system_dark
-        self.activity.language = display.view.language
+        self.view, self.system_dark = saved.view, self._persistence.system_dark
+        display.units, display.frames = saved.units, saved.frames
+        display.dark = self.view.is_dark(self.system_dark)
+        self.activity.language = self.view.language
         size_labels(self.client.scene, text_factor(self._persistence.text_size))
         robot = self.robots.get(saved.robot)
         with self.client.atomic(), self.channel.step(0):
@@ -347,12 +350,12 @@ class VisitorPage(Worker):
                 self.robots.own,
                 robot,
                 display.units,
-                display.system_dark,
+                self.system_dark,
                 self._welcome,
                 [tab.title for tab in self.offered],
                 self.post,
             )
-            self.panel.readout.use_rotations(display.view.rotations)
+            self.panel.readout.use_rotations(self.view.rotations)
             self.panel.fit(gui.main_panel, self._persistence.embedded)
             self.panel.obstacles.expand_by_default = bool(saved.obstacles)
             self.status = self.panel.status
@@ -364,7 +367,7 @@ class VisitorPage(Worker):
             if code := reserved(self._persistence.shown):
                 self.door.open(robot, code)
             detailed = self.services.library.offered(self.services.store.robots)
-            self.forms = Forms(gui, self.panel, self, detailed, self.post)
+            self.forms = Forms(gui, self.panel, self, lambda: self.view, detailed, self.post)
             self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
             self._build_tabs()
             self._persistence.restore(saved)
@@ -402,9 +405,9 @@ class VisitorPage(Worker):
 
     def _use_robot(self, robot: Robot, q: Array | None, glide: bool = False) -> None:
         """Show another robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
-        display = self.display
-        self.bodies.detailed = display.view.detailed
-        self.arm.use(robot, q, display.dark, display.view.base_axes, self.bodies.of(robot, self.robots.own))
+        self.bodies.detailed = self.view.detailed
+        drawn = self.bodies.of(robot, self.robots.own)
+        self.arm.use(robot, q, self.display.dark, self.view.base_axes, drawn)
         self.numbers.use_frames()
         self.joints.renew()
         self.panel.jog.use_robot(robot)

@@ -7,6 +7,8 @@ from typing import Protocol
 
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel.layout import Panel
+from app.viewer.session.channel.channel import Channel
+from app.viewer.session.choices import ViewState
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.numbers import Numbers
@@ -17,6 +19,9 @@ from app.viewer.session.state import PageState
 class Page(Stage, Protocol):
     """A visitor's page. The class itself knows all its parts, so they know it by this description."""
 
+    channel: Channel
+    view: ViewState
+    system_dark: bool
     panel: Panel
     forms: Forms
     posture: PosturePanel

@@ -191,7 +191,7 @@ class Persistence:
             branch=page.arm.branch,
             lesson=page.activity.lesson,
             units=page.display.units,
-            view=page.display.view,
+            view=page.view,
             features={key: state for key, state in states.items() if state},
             locks=tuple(i for i, lock in enumerate(page.arm.locks) if lock),
             camera=page.camera.chosen,
@@ -209,7 +209,7 @@ class Persistence:
             page.links.service.token,
             own,
             arm.obstacles,
-            page.display.view.avoid,
+            page.view.avoid,
         )
         self._share.show(page.links.page, moment, "table" in page.activity.withheld)
 

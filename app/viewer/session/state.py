@@ -154,6 +154,11 @@ def encode(state: PageState) -> str:
     return write(state).text
 
 
+def encode_features(features: dict[str, dict[str, object]], lesson: str) -> str:
+    """A state with nothing but these states of features, at this lesson, as text."""
+    return encode(PageState(lesson=lesson, features=features))
+
+
 def write(state: PageState) -> Written:
     """The state as a text of letters, digits, ``-`` and ``_``.
 

@@ -360,7 +360,7 @@ def test_a_link_makes_the_service_compute_for_those_who_may(everything, monkeypa
         ("cloud", "app.shared.clouds.workspace_slice"),
         ("map", "app.shared.maps.capability_grid"),
         ("sizes", "app.shared.summaries.workspace_facts"),
-        ("target", "app.viewer.session.controller.solve"),
+        ("target", "app.viewer.page.controller.solve"),
     ):
         monkeypatch.setattr(place, counted(name, place, work))
     target = kin.fk(PIONEER, PIONEER.q_home)

@@ -30,8 +30,8 @@ from app.service.main import run
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.page.controller import ArmController
 from app.viewer.server import RESTARTS, ViewerServer
-from app.viewer.session.controller import ArmController
 
 pytestmark = pytest.mark.full
 

@@ -175,7 +175,7 @@ class Actions:
         if state.frames != page.display.frames:
             page.display.use_frames(state.frames)
         page.arm.use_obstacles(state.obstacles)
-        if state.view != page.display.view:
+        if state.view != page.view:
             self._looks.use_view(state.view)
         self.adopt(state)
         if state.lesson != page.activity.lesson:

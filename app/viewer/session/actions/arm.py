@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 import kin
+from app.viewer.arm import DEFAULT_TASK
 from app.viewer.panel.status import BY_HAND, Notice, introduction
 from app.viewer.session.actions.typed import TypedInput
-from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.parts import Page
 from app.viewer.session.state import PageState
 from kin.ik import Task

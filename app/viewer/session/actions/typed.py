@@ -85,7 +85,7 @@ class TypedInput:
         frame = page.display.frames.pose(page.arm.robot, arm.goal, relative)
         present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
         maker = page.arm.robot.maker
-        T, given = read_pose(kind, text, page.display.units, present, page.display.view.rotations, maker)
+        T, given = read_pose(kind, text, page.display.units, present, page.view.rotations, maker)
         T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
         if given != "pose" and page.arm.task != given:
@@ -141,7 +141,7 @@ class TypedInput:
     def switch_axes(self, _: object) -> None:
         """Align the gizmo with the base if it is aligned with the tool, and the reverse."""
         page = self._page
-        self._looks.use_view(replace(page.display.view, base_axes=not page.display.view.base_axes))
+        self._looks.use_view(replace(page.view, base_axes=not page.view.base_axes))
 
     def snap(self, value: object) -> None:
         """Drag the gizmo in steps, or freely."""

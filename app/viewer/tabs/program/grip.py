@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.viewer.session.controller import ArmController
+from app.viewer.page.controller import ArmController
 from kin.motion import Motion
 
 

@@ -46,6 +46,7 @@ from app.viewer.session.state import (
     PageState,
     decode,
     encode,
+    encode_features,
     equal,
     opened_with,
     read_stored_page,
@@ -423,7 +424,7 @@ def test_a_link_opens_for_visitors_who_may_only_look_what_computes_nothing(lesso
     channel = SimpleNamespace(hello=lambda timeout: json.loads(text))
     for rights, shown in ((Rights.FULL, True), (Rights.LOOK, not lesson.computes)):
         activity = SimpleNamespace(review=SimpleNamespace(zone=""))
-        services, links = SimpleNamespace(store=STORE), Links(False)
+        services, links = SimpleNamespace(store=STORE), Links(False, encode_features)
         page_ = SimpleNamespace(channel=channel, services=services, activity=activity, rights=rights, links=links)
         persistence = Persistence(page_, lambda action: action())  # type: ignore[arg-type]
         persistence.load()

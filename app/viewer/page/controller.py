@@ -1,7 +1,7 @@
 """The controller of one visitor's arm: robot, configuration, target, task, locked joints, and inverse kinematics.
 
 The controller owns the arm in the scene and the gizmo. It knows neither the panel nor the status line: what the
-rest of the page must know or say, it reports to an :class:`~app.viewer.session.listener.ArmListener`.
+rest of the page must know or say, it reports to an :class:`~app.viewer.page.listener.ArmListener`.
 
 Two configurations are kept apart. `goal` is where the arm is heading: every answer of inverse kinematics and every
 slider sets it at once, and it is the seed of the next solve. `q` is what the scene shows: it eases towards the
@@ -24,7 +24,8 @@ import viser
 
 import kin
 from app.shared.metrics import SOLVE_SECONDS
-from app.viewer.arm import Arm
+from app.viewer.arm import DEFAULT_TASK, Arm
+from app.viewer.page.listener import ArmListener
 from app.viewer.panel import Post
 from app.viewer.panel.status import BY_HAND, Notice
 from app.viewer.scene import gizmo
@@ -32,8 +33,6 @@ from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
-from app.viewer.session.choices import DEFAULT_TASK
-from app.viewer.session.listener import ArmListener
 from kin import Obstacle, Robot
 from kin.differential.metric import weights
 from kin.ik import Task, solve
