@@ -116,13 +116,12 @@ class SixJoints:
         rows = starts[doubtful]
         sigma, vectors = self._weak(rows)
         flat = sigma[:, 1] < math.sqrt(self.off)
-        sets, stalled = [], False
+        sets = []
         for shares in (_SHARES, -_SHARES):
             tried = rows[:, None] + shares[:, None] * vectors[:, None, 5]
             grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
             wide = rows[flat][:, None] + np.einsum("gc,kcn->kgn", grid, vectors[flat][:, 4:])
-            ends, stopped = self._descended(T, np.concatenate([tried.reshape(-1, 6), wide.reshape(-1, 6)]))
-            stalled |= stopped
+            ends = self._descended(T, np.concatenate([tried.reshape(-1, 6), wide.reshape(-1, 6)]))
             sets.append(self._without_curves(T, np.concatenate([known, ends]))[0])
         found, curves = self._without_curves(T, np.concatenate([known, *sets]))
         agreed = len(found) == len(sets[0]) == len(sets[1]) <= len(q) and not flat.any()
@@ -137,8 +136,8 @@ class SixJoints:
         _, sigma, vectors = np.linalg.svd(self._jacobian(q))
         return np.asarray(sigma[:, :3:-1]), np.asarray(vectors)
 
-    def _descended(self, T: Array, starts: Array) -> tuple[Array, bool]:
-        """Where descents from `starts` ``(k, 6)`` meet the target, and whether some stalled just beside it.
+    def _descended(self, T: Array, starts: Array) -> Array:
+        """Where descents from `starts` ``(k, 6)`` meet the target.
 
         A descent creeps in the valley between two postures that have almost merged. Newton's steps leave it.
         """
@@ -146,10 +145,9 @@ class SixJoints:
         beside = _unique(rows[(errors >= _MET) & (errors < _NEAR * self.size)])
         ends, met = self._newton(T, beside)
         others, reached = self._newton(T, self._across(T, beside[~met]).reshape(-1, 6))
-        doubt = not reached.reshape(-1, 2).all()
         # Near a fold the error of a posture is far larger than that of its pose: only exact ones can be compared.
         exact, _ = self._newton(T, _unique(rows[errors < _MET]))
-        return np.concatenate([exact, ends[met], others[reached]]), doubt
+        return np.concatenate([exact, ends[met], others[reached]])
 
     def _polished(self, T: Array, q: Array, there: Flags) -> tuple[Array, Flags]:
         """The rows q ``(k, 6)`` on the target to the last digit, each posture once, and which are there.
