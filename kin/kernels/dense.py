@@ -17,6 +17,21 @@ from kin.transforms import Array
 
 
 @jit
+def packed(H: Array, free: Array | NDArray[np.bool_], A: Array) -> int:
+    """A ← the lower triangle of a symmetric H ``(n, n)`` over its free indices; returns how many these are."""
+    m = 0
+    for i in range(free.shape[0]):
+        if free[i]:
+            k = 0
+            for j in range(i + 1):
+                if free[j]:
+                    A[m, k] = H[i, j]
+                    k += 1
+            m += 1
+    return m
+
+
+@jit
 def cholesky(A: Array, m: int, damping: float, share: float) -> bool:
     """The lower triangle of the leading m rows of A ← L with ``L Lᵀ = A + damping · I``.
 
@@ -53,36 +68,6 @@ def solve_positive(A: Array, m: int, damping: float, share: float, x: Array) -> 
         for k in range(i + 1, m):
             total -= A[k, i] * x[k]
         x[i] = total / A[i, i]
-    return True
-
-
-@jit
-def solve_free(
-    H: Array, g: Array, free: NDArray[np.bool_], damping: float, share: float, L: Array, x: Array
-) -> bool:
-    """x ← (H + damping · I)⁻¹ g on the free indices, given x on the others; False as by `cholesky`.
-
-    Of H ``(n, n)`` the lower triangle is read; L ``(n, n)`` is scratch.
-    """
-    n, m = g.shape[0], 0
-    y = np.empty(n)
-    for i in range(n):
-        if free[i]:
-            y[m] = g[i]
-            k = 0
-            for j in range(n):
-                if not free[j]:
-                    y[m] -= (H[i, j] if j < i else H[j, i]) * x[j]
-                elif j <= i:
-                    L[m, k] = H[i, j]
-                    k += 1
-            m += 1
-    if not solve_positive(L, m, damping, share, y):
-        return False
-    for i in range(n - 1, -1, -1):
-        if free[i]:
-            m -= 1
-            x[i] = y[m]
     return True
 
 

@@ -8,11 +8,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
-from kin.kernels.dense import solve_free
+from kin.kernels.dense import packed, solve_positive
 from kin.transforms import Array
 
 Bounds = tuple[Array, Array, Array]  # lower, upper, turns
 STRIDE = 1.5  # radians or metres of one joint in one step at most
+
+
+@jit
+def solve_free(H: Array, g: Array, free: NDArray[np.bool_], damping: float, L: Array, x: Array) -> bool:
+    """x ← (H + damping · I)⁻¹ g on the free indices, given x on the others; False if that is not positive.
+
+    H is a lower triangle; L ``(n, n)`` is scratch.
+    """
+    n, k = g.shape[0], 0
+    m, y = packed(H, free, L), np.empty(n)
+    for i in range(n):
+        if free[i]:
+            y[k] = g[i]
+            for j in range(n):
+                if not free[j]:
+                    y[k] -= (H[i, j] if j < i else H[j, i]) * x[j]
+            k += 1
+    if not solve_positive(L, m, damping, 0.0, y):
+        return False
+    for i in range(n - 1, -1, -1):
+        if free[i]:
+            k -= 1
+            x[i] = y[k]
+    return True
 
 
 @jit
@@ -43,7 +67,7 @@ def bounded_step(
         free[i] = not held[i]
         step[i] = 0.0
     for _ in range(n + 1):
-        if not solve_free(H, g, free, damping, 0.0, L, step):
+        if not solve_free(H, g, free, damping, L, step):
             return False
         longest = 0.0
         for i in range(n):

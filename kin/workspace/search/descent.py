@@ -21,10 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
-from kin.kernels.dense import solve_free
+from kin.kernels.dense import packed, solve_positive
 from kin.kernels.jacobian import jacobian_into
 from kin.transforms import Array
 from kin.workspace.region import BoundedArm
@@ -44,12 +43,12 @@ class Scratch(NamedTuple):
 
     Attributes:
         J: ``(6, n)`` Jacobian at q.
-        H: ``(n, n)`` Hessian of f, lower triangle; what it has of held joints counts for nothing, but is finite.
+        H: ``(n, n)`` Hessian of f.
         L: ``(n, n)`` its Cholesky factor.
         axes: ``(n, 7)`` scratch of the Jacobian.
         T: ``(4, 4)`` tool pose.
         slope: ``(n,)`` gradient of f with respect to q.
-        free: ``(n,)`` whether a joint may move: it is not held at a limit.
+        free: ``(n,)`` 1.0 for a joint that may move, 0.0 for one held at a limit.
         q, step, trial: ``(n,)`` configuration of the caller's descent, Newton step, configuration after it.
         w: ``(3,)`` gradient of f with respect to the tool point.
     """
@@ -60,7 +59,7 @@ class Scratch(NamedTuple):
     axes: Array
     T: Array
     slope: Array
-    free: NDArray[np.bool_]
+    free: Array
     q: Array
     step: Array
     trial: Array
@@ -71,9 +70,18 @@ class Scratch(NamedTuple):
 def make_scratch(n: int) -> Scratch:
     """Scratch of descents with n joints."""
     return Scratch(
-        np.empty((6, n)), np.zeros((n, n)), np.empty((n, n)), np.empty((n, 7)), np.empty((4, 4)), np.empty(n),
-        np.empty(n, dtype=np.bool_), np.empty(n), np.empty(n), np.empty(n), np.empty(3),
-    )  # fmt: skip
+        np.empty((6, n)),
+        np.empty((n, n)),
+        np.empty((n, n)),
+        np.empty((n, 7)),
+        np.empty((4, 4)),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(3),
+    )
 
 
 def quadratic(D: Array | None = None, centre: Array | None = None, slope: Array | None = None) -> Array:
@@ -108,7 +116,7 @@ def _gradient(arm: BoundedArm, q: Array, work: Scratch) -> float:
         slope = w[0] * J[0, j] + w[1] * J[1, j] + w[2] * J[2, j]
         held = (q[j] <= arm.lower[j] and slope >= 0.0) or (q[j] >= arm.upper[j] and slope <= 0.0)
         work.slope[j] = slope
-        work.free[j] = not held
+        work.free[j] = 0.0 if held else 1.0
         if not held:
             steepest = max(steepest, abs(slope))
     return steepest
@@ -120,19 +128,20 @@ def _hessian(f: Array, work: Scratch) -> float:
     J, H, free, w = work.J, work.H, work.free, work.w
     scale = 0.0
     for j in range(free.shape[0]):
-        if not free[j]:
+        if free[j] == 0.0:
             continue
         bx = f[0] * J[0, j] + f[1] * J[1, j] + f[2] * J[2, j]
         by = f[3] * J[0, j] + f[4] * J[1, j] + f[5] * J[2, j]
         bz = f[6] * J[0, j] + f[7] * J[1, j] + f[8] * J[2, j]
         for i in range(j + 1):
-            if not free[i]:
+            if free[i] == 0.0:
                 continue
             # w · (z × J) with the joint axis z; its rows of J are zero for a prismatic joint.
             cx = J[4, i] * J[2, j] - J[5, i] * J[1, j]
             cy = J[5, i] * J[0, j] - J[3, i] * J[2, j]
             cz = J[3, i] * J[1, j] - J[4, i] * J[0, j]
             h = J[0, i] * bx + J[1, i] * by + J[2, i] * bz + w[0] * cx + w[1] * cy + w[2] * cz
+            H[i, j] = h
             H[j, i] = h
         scale = max(scale, abs(H[j, j]))
     return scale
@@ -141,13 +150,17 @@ def _hessian(f: Array, work: Scratch) -> float:
 @jit
 def _newton_step(shift: float, work: Scratch) -> bool:
     """work.step ← −(H + shift)⁻¹ slope on the free joints; False if that is not positive definite."""
-    step = work.step
-    for i in range(step.shape[0]):
-        step[i] = 0.0
-    if not solve_free(work.H, work.slope, work.free, shift, 1e-12, work.L, step):
+    slope, free, step = work.slope, work.free, work.step
+    m, k = packed(work.H, free, work.L), 0
+    for i in range(slope.shape[0]):
+        if free[i]:
+            step[k] = -slope[i]
+            k += 1
+    if not solve_positive(work.L, m, shift, 1e-12, step):
         return False
-    for i in range(step.shape[0]):
-        step[i] = -step[i]
+    for i in range(slope.shape[0] - 1, -1, -1):
+        k -= 1 if free[i] else 0
+        step[i] = step[k] if free[i] else 0.0
     return True
 
 

@@ -17,14 +17,13 @@ def positive(n):
 
 @pytest.mark.parametrize("n", [1, 3, 6, 7])
 def test_a_positive_system_is_solved_over_its_free_indices(n):
-    H, g, x = positive(n), RNG.normal(size=n), RNG.normal(size=n)
-    free, given = np.arange(n) != 1, x.copy()
-    lower, L = np.where(np.tri(n), H, np.nan), np.full((n, n), np.nan)
-    assert dense.solve_free(lower, g, free, 0.5, 0.0, L, x)
-    m = int(free.sum())
-    right = g[free] - H[np.ix_(free, ~free)] @ given[~free]
-    assert np.abs(x[free] - np.linalg.solve(H[np.ix_(free, free)] + 0.5 * np.eye(m), right)).max() < 1e-12
-    assert np.array_equal(x[~free], given[~free])
+    H, L, x = positive(n), np.full((n, n), np.nan), RNG.normal(size=n)
+    free = np.arange(n) != 1
+    m, right = dense.packed(np.tril(H) + np.triu(np.full((n, n), np.nan), 1), free, L), x.copy()
+    assert m == free.sum()
+    assert dense.solve_positive(L, m, 0.5, 0.0, x)
+    expected = np.linalg.solve(H[np.ix_(free, free)] + 0.5 * np.eye(m), right[:m])
+    assert np.abs(x[:m] - expected).max() < 1e-12
 
 
 def test_the_gram_matrix_is_of_the_rows_that_count():
