@@ -102,25 +102,7 @@ def as_transform(value: ArrayLike, field: str = "target") -> Array:
 
 
 def pose_from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Array:
-    """Transform ``(4, 4)`` from a position ``(3,)`` in metres and a quaternion ``(4,)`` (scalar first).
-
-    The quaternion is normalised.
-
-    Args:
-        position: ``(3,)`` in metres.
-        wxyz: ``(4,)`` quaternion of any length, scalar first; None: no rotation.
-
-    Returns:
-        The transform.
-
-    Raises:
-        InputError: numbers that are not finite, another shape, or a quaternion of zeros.
-
-    Examples:
-        >>> import kin
-        >>> kin.pose_from_position_wxyz([0.4, 0.0, 0.2], [0.0, 1.0, 0.0, 0.0])[:3, 2]  # upside down
-        array([ 0.,  0., -1.])
-    """
+    """`kin.pose_from_position_wxyz` for a quaternion of any length but zero; raises `InputError`."""
     T = np.eye(4)
     p = finite_array("position", position, (3,))
     if p.ndim != 1:
@@ -132,24 +114,7 @@ def pose_from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) 
 
 
 def rotation_from_wxyz(wxyz: ArrayLike) -> Array:
-    """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)`` of any length.
-
-    Args:
-        wxyz: scalar first.
-
-    Returns:
-        The rotation matrix.
-
-    Raises:
-        InputError: it is zero, not finite, or not four numbers.
-
-    Examples:
-        >>> import kin
-        >>> kin.rotation_from_wxyz([1.0, 0.0, 0.0, 0.0])
-        array([[1., 0., 0.],
-               [0., 1., 0.],
-               [0., 0., 1.]])
-    """
+    """`kin.rotation_from_wxyz` for a quaternion of any length but zero; raises `InputError`."""
     numbers = finite_array("wxyz", wxyz, (4,))
     if numbers.ndim != 1:
         raise InputError("wxyz", f"shape {numbers.shape}", "four numbers w, x, y, z")

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.angles import wrapped
 from kin.axes import generic_q
@@ -176,13 +177,16 @@ class Search:
 
     # -- judging -----------------------------------------------------------------------------------------------
 
-    def _judge(self, level: _Level, frames: bool) -> None:
-        """Keep the tables that are a: as they are, or with other frames and zeros."""
-        tables = level.tables
+    def _with_joints_of_a(self, tables: Tables) -> NDArray[np.intp]:
+        """Which tables have as many joints as a, of the same kinds."""
         rows = tables.joint_rows
         if len(rows) != self._a.n:
-            return
-        index = np.flatnonzero((tables.kinds[:, rows] == self._kinds).all(axis=1))
+            return np.empty(0, dtype=np.intp)
+        return np.flatnonzero((tables.kinds[:, rows] == self._kinds).all(axis=1))
+
+    def _judge(self, level: _Level, frames: bool) -> None:
+        """Keep the tables that are a: as they are, or with other frames and zeros."""
+        tables, index = level.tables, self._with_joints_of_a(level.tables)
         if not index.size:
             return
         first = chain(tables.take(index), self._probes[:1]).T[:, 0]
@@ -253,11 +257,7 @@ class Search:
 
     def _solve(self, level: _Level) -> None:
         """Single numbers with which a table is a."""
-        tables = level.tables
-        rows = tables.joint_rows
-        if len(rows) != self._a.n:
-            return
-        index = np.flatnonzero((tables.kinds[:, rows] == self._kinds).all(axis=1))
+        tables, index = level.tables, self._with_joints_of_a(level.tables)
         if not index.size:
             return
         if self._fixed:
