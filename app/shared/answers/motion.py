@@ -110,6 +110,8 @@ class RefusalDetailsAnswer(Answer):
 
     violations: list[Violation] | UnsetType = UNSET
     """Causes "start" and "target": the joint values outside the limits."""
+    details: IkDetails | UnsetType = UNSET
+    """Cause "unreachable": the numbers of inverse kinematics, as in the answers of `ik`."""
     cause: IkCause | UnsetType = UNSET
     """Cause "unreachable": its cause, as in the answers of `ik`."""
     task: str | UnsetType = UNSET
@@ -180,7 +182,8 @@ class RefusalAnswer(Answer):
     reason: str
     """All of it in sentences for people."""
     ik: Annotated[IkDetails | UnsetType, From(_ik_details)] = UNSET
-    """Cause "unreachable": the numbers of inverse kinematics, as in the answers of `ik`."""
+    """Cause "unreachable": the numbers of inverse kinematics, as in the answers of `ik`. They are in
+    `details.details` too, for older clients."""
 
 
 class NoteAnswer(Answer):

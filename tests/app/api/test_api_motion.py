@@ -189,6 +189,7 @@ def test_a_pose_out_of_reach_is_explained_as_inverse_kinematics_does(client):
     refusal = post(client, {"program": program}).json()["refusal"]
     assert (refusal["cause"], refusal["details"]["cause"]) == ("unreachable", "too far")
     assert refusal["ik"]["distance"] > 1.0
+    assert refusal["details"]["details"] == refusal["ik"], "where it was before"
 
 
 def test_a_slow_place_beside_a_singularity_comes_with_what_leads_past_it(client):
