@@ -38,98 +38,11 @@ async function openViewerWhenReady() {
   byId("placeholder").textContent = "Loading the viewer…";
 }
 
-function element(tag, text, className) {
-  const node = document.createElement(tag);
-  node.textContent = text;
-  if (className) node.className = className;
-  return node;
-}
-
-// The fragment that restores a view: see app/viewer/session/state.py.
-function viewerWith(robot) {
-  return "viewer/#s=" + btoa(JSON.stringify({ v: 1, robot: robot.id })).replace(/=+$/, "");
-}
-
-// Robots added by the operator have no picture; this drawing replaces it.
-function placeholder() {
-  const drawing = byId("any-arm").content.firstElementChild.cloneNode(true);
-  return document.importNode(drawing, true);
-}
-
-function picture(robot) {
-  const image = document.createElement("img");
-  image.src = `static/robots/${encodeURIComponent(robot.id)}.webp`;
-  image.alt = "";
-  image.width = 320;
-  image.height = 240;
-  image.loading = "lazy";
-  image.addEventListener("error", () => image.replaceWith(placeholder()), { once: true });
-  return image;
-}
-
-function card(robot) {
-  const item = element("li", "", "card");
-  const title = element("h3", "");
-  const link = element("a", robot.name);
-  link.href = viewerWith(robot);
-  link.target = "viewer"; // the frame above, or a new tab before the frame exists
-  link.addEventListener("click", () => byId("viewer").scrollIntoView());
-  title.append(link);
-  const facts = element("ul", "", "facts");
-  facts.append(element("li", `${robot.n} joints`), element("li", `${robot.convention} DH`));
-  // With a joint to spare, each posture is a continuum.
-  if (robot.n > 6) facts.append(element("li", "redundant"));
-  else if (robot.branches.length) facts.append(element("li", `${robot.branches.length} postures`));
-  const text = element("p", robot.description.split(/(?<=\.) /)[0]);
-  text.title = robot.description;
-  const shown = element("div", "", "shown");
-  shown.append(picture(robot));
-  item.append(shown, title, facts, text, element("code", robot.id, "id"));
-  return item;
-}
-
-function ownCard() {
-  const item = element("li", "", "card");
-  const title = element("h3", "");
-  const link = element("a", "Your arm");
-  link.href = "viewer/#tab=Robot";
-  link.target = "viewer";
-  link.addEventListener("click", () => byId("viewer").scrollIntoView());
-  title.append(link);
-  const shown = element("div", "", "shown");
-  shown.append(placeholder());
-  const facts = element("ul", "", "facts");
-  facts.append(element("li", "DH table"), element("li", "URDF or MJCF"));
-  const text = element("p", "Type its DH table, or drop its file onto the viewer: FK, all its postures and its workspace at once.");
-  item.append(shown, title, facts, text);
-  return item;
-}
-
-// The visitor's own arm, the classics and the operator's arms; the library follows on request.
-function showCards(cards, robots) {
-  const library = new Set(cards.dataset.library.split(" "));
-  const later = robots.filter((robot) => library.has(robot.id));
-  cards.replaceChildren(ownCard(), ...robots.filter((robot) => !library.has(robot.id)).map(card));
-  const more = byId("more");
-  more.textContent = `Show ${later.length} more arms`;
-  more.hidden = later.length === 0;
-  more.addEventListener("click", () => {
-    const added = later.map(card);
-    cards.append(...added);
-    more.hidden = true;
-    added[0].querySelector("a").focus();
-  });
-}
-
-async function fillCards() {
-  const cards = byId("cards");
-  try {
-    const answer = await fetch("api/v1/robots");
-    if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
-    showCards(cards, (await answer.json()).robots);
-  } catch (error) {
-    cards.replaceChildren(element("li", `The robots could not be loaded: ${error.message}.`, "card quiet"));
-  }
+function showMore() {
+  const later = document.querySelectorAll("#cards [hidden]");
+  for (const card of later) card.hidden = false;
+  byId("more").hidden = true;
+  later[0].querySelector("a").focus();
 }
 
 // The form to try REST
@@ -219,5 +132,6 @@ async function copy(text) {
 }
 
 prepareBox();
-fillCards();
+byId("more").addEventListener("click", showMore);
+byId("cards").addEventListener("click", (event) => { if (event.target.closest("a")) byId("viewer").scrollIntoView(); });
 openViewerWhenReady();

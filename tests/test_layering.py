@@ -155,7 +155,7 @@ RULES: dict[str, set[str]] = {
         *("app.exercises", "app.service.web.rate_limit", "app.service.web.rooms", "app.shared"),
     },
     "app/service/web": {
-        *("anyio", "starlette", "msgspec", "itsdangerous", "kin"),
+        *("anyio", "starlette", "msgspec", "itsdangerous", "jinja2", "kin"),
         *("app.api.problems", "app.bench.board", "app.classroom", "app.service.web", "app.shared"),
     },
     "app/service/web/agents.py": {

@@ -144,7 +144,7 @@ def create_app(
     show_in_gauges(state, bridge, pool)
     install_problem_handlers(app)
     complete_document(app, settings)
-    app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
+    app.router.routes.extend([*api_routes(), *page_routes(store), *embedding_routes(), *bridge.routes()])
     app.router.routes.extend(room_routes(classroom, settings, known, state.tries))
     app.router.routes.extend(lti_routes(classroom, settings, known))
     app.include_router(status.router)

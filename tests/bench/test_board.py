@@ -16,6 +16,7 @@ from app.bench.board.picture import NARROW, WIDE, picture, standalone
 from app.bench.board.views import busy, facts, sections, summary
 from app.bench.board.words import ratio_text, share_text, time_text
 from app.service.web.pages import page_routes
+from app.shared.store import Store
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +104,7 @@ def test_a_file_needs_no_other_file_and_a_service_brings_its_own(document):
 
 
 def test_the_service_shows_the_recorded_run_and_starts_none(document):
-    client = TestClient(Starlette(routes=page_routes()))
+    client = TestClient(Starlette(routes=page_routes(Store())))
     shown = client.get("/scoreboard")
     assert (shown.text, shown.headers["cache-control"]) == (page(document, served=True), "no-cache")
     assert client.get("/scoreboard.json").json() == document

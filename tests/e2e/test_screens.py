@@ -202,13 +202,13 @@ def test_pages_without_a_viewer(browser: Browser, address: str, scheme: str) -> 
     for name, path in (("landing", ""), ("login", "login"), ("scoreboard", "scoreboard")):
         page.goto(address + path)
         if name == "landing":
-            expect(page.locator(".card h3 a")).to_have_count(
+            expect(page.locator(".card h3 a:visible")).to_have_count(
                 len(kin.files.classic_robots()) + 1
             )  # the visitor's own
             page.get_by_role("button", name="more arms").click()
-            expect(page.locator(".card h3 a")).to_have_count(len(kin.builtin_robots()) + 1)
+            expect(page.locator(".card h3 a:visible")).to_have_count(len(kin.builtin_robots()) + 1)
             page.reload()
-            expect(page.locator(".card h3 a")).to_have_count(
+            expect(page.locator(".card h3 a:visible")).to_have_count(
                 len(kin.files.classic_robots()) + 1
             )  # the visitor's own
         for width, height in ((1280, 720), (390, 844)):

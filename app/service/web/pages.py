@@ -1,4 +1,4 @@
-"""The landing page, the page of the API documentation, the scoreboard, and the files in ``static/``.
+"""Routes of the landing page, the page of the API documentation, the scoreboard, and the files in ``static/``.
 
 All their links are relative, so they work below any path prefix, and nothing is loaded from another host.
 """
@@ -17,16 +17,16 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Message, Receive, Scope, Send
 
 from app.api.problems import ProblemError, respond
+from app.service.web.landing import landing_page
 from app.shared.settings import static_folder
-from kin import __version__, builtin_robots
-from kin.files import classic_robots
+from app.shared.store import Store
 
 
-def page_routes() -> list[BaseRoute]:
+def page_routes(store: Store) -> list[BaseRoute]:
     """``/``, ``/docs``, ``/scoreboard`` with its data, and ``/static``."""
     folder = static_folder()
     return [
-        Route("/", _html_page(folder / "index.html"), name="landing"),
+        Route("/", landing_page(store), name="landing"),
         Route("/docs", _html_page(folder / "docs.html"), name="docs"),
         Route("/docs/", partial(_without_slash, "docs")),
         Route("/scoreboard", _scoreboard, name="scoreboard"),
@@ -38,8 +38,7 @@ def page_routes() -> list[BaseRoute]:
 
 
 def _html_page(file: Path) -> Callable[[Request], Awaitable[Response]]:
-    library = " ".join(sorted(builtin_robots().keys() - classic_robots().keys()))
-    body = file.read_text(encoding="utf-8").replace("{{version}}", __version__).replace("{{library}}", library)
+    body = file.read_text(encoding="utf-8")
 
     async def page(_: Request) -> Response:
         return HTMLResponse(body, headers={"cache-control": "no-cache"})
