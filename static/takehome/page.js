@@ -338,11 +338,14 @@
     ArrowLeft: [-1, 1], ArrowDown: [-1, 1], ArrowRight: [1, 1], ArrowUp: [1, 1], PageDown: [-1, 10], PageUp: [1, 10],
   };
 
-  // How far a key moves a value; 0: it does not.
-  function stepOf(event, turns) {
-    const [sign, far] = STEPS[event.key] ?? [0, 1];
-    if (event.ctrlKey || event.metaKey || event.altKey) return 0;
-    return sign * (turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1);
+  // Has the keys of STEPS, but for some, move a value: shift(by) gets how far.
+  function steps(field, turns, shift, others = []) {
+    field.addEventListener("keydown", (event) => {
+      const [sign, far] = STEPS[event.key] ?? [0, 1];
+      if (!sign || others.includes(event.key) || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      shift(sign * (turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1));
+    });
   }
 
   // A field for a number, between two limits if there are any; set(value) takes what was typed.
@@ -379,48 +382,29 @@
     return { field, unit, error, refresh };
   }
 
-  const rows = robot.joints.map((joint, i) => {
-    const { lower, upper, name, turns } = joint;
-    const slider = node("input", { type: "range", step: "any", min: lower, max: upper, "aria-label": name });
-    const number = numberField(`${name}, exact value`, turns, [lower, upper], () => state.q[i], (value) => move(i, value));
-    const row = node("div", { class: "joint" }, node("label", { title: name }, name), slider, number.field, number.unit, number.error);
-    row.style.setProperty("--of", `rgb(${joint.color})`);
-    find("#joints").append(row);
-    slider.addEventListener("input", () => move(i, clamp(Number(slider.value), lower, upper)));
+  // A slider and a field for a number between two limits, in a row.
+  function sliderRow(row, label, turns, [low, high], value, set) {
+    const slider = node("input", { type: "range", step: "any", min: low, max: high, "aria-label": label });
+    const number = numberField(`${label}, exact value`, turns, [low, high], value, set);
+    row.append(node("label", { title: label }, label), slider, number.field, number.unit, number.error);
+    slider.addEventListener("input", () => set(clamp(Number(slider.value), low, high)));
     // Without this the keys of a slider move it by a hundredth of its range.
-    slider.addEventListener("keydown", (event) => {
-      const by = stepOf(event, turns);
-      if (!by) return;
-      event.preventDefault();
-      move(i, clamp(state.q[i] + by, lower, upper));
-    });
+    steps(slider, turns, (by) => set(clamp(value() + by, low, high)));
     return { slider, ...number };
-  });
-
-  const cells = robot.rows.map((row) => {
-    const line = node("tr", {}, node("th", { scope: "row" }, row.name));
-    const made = ["theta", "d", "a", "alpha"].map((name) => {
-      const cell = node("td");
-      if (row.moves === name) cell.dataset.moves = "";
-      line.append(cell);
-      return cell;
-    });
-    find("#rows table").append(line);
-    return made;
-  });
-
-  function heads() {
-    const angle = unitOf(true);
-    const names = ["row", `θ (${angle})`, `d (${data.units.length})`, `a (${data.units.length})`, `α (${angle})`];
-    find("#rows thead")?.remove();
-    find("#rows table").prepend(node("thead", {}, node("tr", {}, ...names.map((name) => node("th", { scope: "col" }, name)))));
   }
 
-  const pose = ["x", "y", "z", "roll", "pitch", "yaw"].map((name) => {
-    const value = node("dd");
-    find("#pose").append(node("div", {}, node("dt", {}, name), value));
-    return value;
+  const rows = robot.joints.map(({ lower, upper, name, turns, color }, i) => {
+    const row = node("div", { class: "joint" });
+    row.style.setProperty("--of", `rgb(${color})`);
+    find("#joints").append(row);
+    return sliderRow(row, name, turns, [lower, upper], () => state.q[i], (value) => move(i, value));
   });
+
+  const cells = [...document.querySelectorAll("#rows tbody tr")].map((row) => row.querySelectorAll("td"));
+  const pose = document.querySelectorAll("#pose dd");
+  function heads() {
+    for (const unit of document.querySelectorAll("#rows thead span")) unit.textContent = unitOf("turns" in unit.dataset);
+  }
 
   let describing = 0;
 
@@ -464,13 +448,10 @@
   const aims = !solver ? [] : ["x", "y", "z", "roll", "pitch", "yaw"].map((name, k) => {
     const set = (value) => aim(poseAt(sixOf(state.target).with(k, value)));
     const made = numberField(`target ${name}`, k > 2, k > 2 ? [-Infinity, Infinity] : [-FAR, FAR], () => sixOf(state.target)[k], set);
-    made.field.addEventListener("keydown", (event) => {
-      const by = ["ArrowLeft", "ArrowRight"].includes(event.key) ? 0 : stepOf(event, k > 2);
-      if (!by) return;
-      event.preventDefault();
+    steps(made.field, k > 2, (by) => {
       set(sixOf(state.target)[k] + by);
       made.field.value = written(sixOf(state.target)[k], k > 2);
-    });
+    }, ["ArrowLeft", "ArrowRight"]);
     find("#aim").append(node("div", { class: "aim" }, node("label", {}, name), made.field, made.unit, made.error));
     return made;
   });
@@ -602,18 +583,9 @@
   const free = data.solver?.parameter && freeSlider(data.solver.parameter);
 
   function freeSlider({ label, low, high }) {
-    const slider = node("input", { type: "range", step: "any", min: low, max: high, "aria-label": label });
-    const number = numberField(`${label}, exact value`, true, [low, high], () => Number(slider.value), hold);
-    find("#free .joint").append(node("label", {}, label), slider, number.field, number.unit, number.error);
     find("#free").hidden = false;
-    slider.addEventListener("input", () => hold(Number(slider.value)));
-    slider.addEventListener("keydown", (event) => {
-      const by = stepOf(event, true);
-      if (!by) return;
-      event.preventDefault();
-      hold(clamp(Number(slider.value) + by, low, high));
-    });
-    return { slider, ...number };
+    const row = sliderRow(find("#free .joint"), label, true, [low, high], () => Number(row.slider.value), hold);
+    return row;
   }
 
   // Another value while the tool stays: the arm keeps its posture, by name, if it has it there.

@@ -142,6 +142,7 @@ def _page(saved: SavedArm, drawn: Drawing | None, shared: bool) -> str:
         "takehome/page",
         title=saved.robot.name,
         joints=saved.robot.n,
+        rows=_rows(saved.robot),
         source=saved.robot.source,
         version=__version__,
         link=saved.link,

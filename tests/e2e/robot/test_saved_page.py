@@ -71,7 +71,7 @@ def saved(browser: Browser, file: Path) -> Iterator[Page]:
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: said.append(request.url))
     page.goto(file.as_uri())
-    expect(page.locator("#pose dd")).to_have_count(6)  # its meshes are unpacked
+    expect(page.locator("#pose dd").last).not_to_be_empty()  # its meshes are unpacked
     yield page
     page.close()
     # Chromium without a graphics card says that it draws in software.
@@ -92,7 +92,7 @@ def test_forward_kinematics_are_those_of_kin(saved: Page, count: int) -> None:
 
 
 def test_a_slider_and_a_typed_value_move_the_arm(saved: Page) -> None:
-    expect(saved.locator("#pose dd")).to_have_count(6)
+    expect(saved.locator("#pose dd").last).not_to_be_empty()
     field = saved.get_by_label("elbow, exact value")
     field.fill("-30,5°")
     field.press("Enter")
