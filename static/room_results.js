@@ -8,21 +8,16 @@
         const answer = await fetch(location.href, { cache: "no-store" });
         const page = new DOMParser().parseFromString(await answer.text(), "text/html");
         const fresh = page.getElementById("results");
-        if (fresh) show(fresh);
+        if (fresh) morphdom(document.getElementById("results"), fresh, { getNodeKey: (node) => node.dataset?.key, onBeforeElUpdated: keepOpen });
       } catch {
         // The service is away: the next time may succeed, and what is shown stays.
       }
     }
     setTimeout(renew, EVERY);
   }
-  function show(fresh) {
-    const shown = document.getElementById("results");
-    const open = new Set([...shown.querySelectorAll("details[open]")].map((each) => each.dataset.key));
-    const focused = document.activeElement?.closest("details")?.dataset.key;
-    for (const each of fresh.querySelectorAll("details")) each.open = open.has(each.dataset.key);
-    if (fresh.innerHTML === shown.innerHTML) return;
-    shown.replaceChildren(...fresh.childNodes);
-    if (focused) [...shown.querySelectorAll("details")].find((each) => each.dataset.key === focused)?.firstElementChild.focus();
+  function keepOpen(shown, fresh) {
+    if (shown.localName === "details") fresh.open = shown.open;
+    return true;
   }
   setTimeout(renew, EVERY);
 })();
