@@ -315,8 +315,9 @@ class ArmController:
 
     def open_gripper(self, opening: float) -> None:
         """Open the gripper so far, as if its slider were moved there."""
-        self.scene.open_gripper(opening)
-        self._listener.on_gripper()
+        if opening != self.scene.opened:  # else it would be news for a program
+            self.scene.open_gripper(opening)
+            self._listener.on_gripper()
 
     def set_task(self, task: Task) -> None:
         """Change how much of the target pose the arm must match."""

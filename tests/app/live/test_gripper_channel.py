@@ -68,6 +68,9 @@ def test_the_page_refuses_it_as_well(viewer, shown):
         assert program.hears("gripper", lambda opening: opening == 0.5)
         program.do(gripper=0.25)
         assert program.hears("gripper", lambda opening: opening == 0.25)
+        program.heard.clear()
+        program.do(gripper=0.25)
+        assert "gripper" not in program.heard, "the same is no news"
         assert program.refused(gripper=1.01)["errors"][0]["field"] == "gripper"
         program.do(robot="ur5")
         assert program.hears("gripper", lambda opening: opening is None) is None

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from app.viewer.page.controller import ArmController
+from app.viewer.feature import Stage
 from kin.motion import Motion
 
 
-def show(arm: ArmController, motion: Motion | None, time: float, before: float) -> float:
+def show(stage: Stage, motion: Motion | None, time: float, before: float) -> float:
     """Open the gripper as far as it is at a time of a motion; until its first row begins it stays as it is.
 
     Args:
@@ -15,12 +15,11 @@ def show(arm: ArmController, motion: Motion | None, time: float, before: float) 
     Returns:
         The same for the next time.
     """
-    now = arm.opening
+    now = stage.arm.opening
     first = next((each for each in motion.segments if each.opening is not None), None) if motion else None
     if motion is None or first is None or now is None:
         return before
     if time <= first.start < first.end:
         return now
-    if (opening := float(motion.opening(time, before))) != now:
-        arm.open_gripper(opening)
+    stage.arm.open_gripper(float(motion.opening(time, before)))
     return before

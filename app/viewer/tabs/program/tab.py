@@ -530,7 +530,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         assert f.motion is not None
         assert f.plan is not None
         q = f.robot.clip(f.motion.derivatives(time)[0])
-        self.change(time=time, sent=q, opened=grip.show(self.stage.arm, f.motion, time, self.settings.opened))
+        self.change(time=time, sent=q, opened=grip.show(self.stage, f.motion, time, self.settings.opened))
         self.stage.arm.move_to(q, notice or views.playing(f.plan, f.plan.row_at(time)), at_once=not ease)
 
     def _scrub(self, time: object) -> None:
@@ -550,7 +550,7 @@ class ProgramTab(DeclaredFeature[ProgramSettings, ProgramFacts]):
         time, q = f.plan.met(index, f.point if index == f.chosen else MOST)
         if time is not None:
             self._stop()
-            self.change(time=time, opened=grip.show(self.stage.arm, f.motion, time, self.settings.opened))
+            self.change(time=time, opened=grip.show(self.stage, f.motion, time, self.settings.opened))
         self.stage.arm.move_to(f.robot.clip(q), Notice("hand", views.title(index, f.segments[index])))
 
     def commands(self) -> Iterable[tuple[str, tuple[str | int, ...], object]]:
