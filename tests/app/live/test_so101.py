@@ -26,6 +26,7 @@ from live_server import ready, wait_for
 import kin
 from app.cli.parser import main
 from app.live.client.connection import Connection
+from app.live.recording.table import GRIPPER, heads
 from app.servos import command
 from app.servos.bus import Bus
 from app.servos.calibration import Calibration
@@ -380,7 +381,7 @@ def test_the_page_of_the_command_has_a_process_of_its_own(typed, monkeypatch, pa
 
 @pytest.mark.full
 def test_the_gripper_follows_slider_and_program(page, bus, run, typed, patient, capsys):
-    """The page takes over where it is; then the slider leads it, and a program that is played."""
+    """The page takes over where it is; then the slider leads it, a program that is played, and a recording."""
     low, high = RANGES[5]
 
     def opening() -> float:
@@ -399,6 +400,12 @@ def test_the_gripper_follows_slider_and_program(page, bus, run, typed, patient, 
         number = page.say("feature", ["program", [name, 1], value])
         page.wait(lambda number=number: page.script["reply"][0] >= number)
     page.wait(lambda: opening() == pytest.approx(0.3, abs=0.005))
+    there, nothing = ",".join(map(repr, q)), "," * (ARM.n - 1)  # commanded, measured
+    lines = [",".join([*heads(ARM), GRIPPER]), f"0.0,{there},{nothing},0.3", f"1.0,{there},{nothing},0.9"]
+    page.open_file("connect", "run.csv", "\n".join(lines))
+    page.wait(lambda: "run.csv is open" in page.html)
+    page.send("GuiUpdateMessage", uuid=page.element("Play recording"), updates={"value": True})
+    page.wait(lambda: opening() == pytest.approx(0.9, abs=0.005))
     assert bus.refused == 0
     started.end(page)
 
