@@ -3,7 +3,7 @@
 (() => {
   const AXES = [["x", "#c62828"], ["y", "#2e7d32"], ["z", "#1565c0"]];
   const LENGTH = 25, END = 8, MIDDLE = 36; // of a drawing of 72 units
-  let node = null;
+  const node = document.getElementById("kb-axes");
 
   /** The axes in the picture, the farthest first. wxyz: the camera, whose x is to the right, y down, z forward. */
   function seen([w, x, y, z]) {
@@ -15,7 +15,6 @@
   }
 
   function draw(wxyz) {
-    if (!node) return;
     node.innerHTML = seen(wxyz).map(({ name, color, x, y, away }) => {
       const [endX, endY] = [MIDDLE + LENGTH * x, MIDDLE + LENGTH * y].map((value) => value.toFixed(1));
       return `<g data-axis="${name}" opacity="${away > 0.1 ? 0.6 : 1}"><path d="M${MIDDLE} ${MIDDLE}L${endX} ${endY}" stroke="${color}" stroke-width="2.5" stroke-linecap="round"/>`
@@ -23,14 +22,5 @@
     }).join("");
   }
 
-  let last = null;
-  viserPage.watchCamera((wxyz) => { last = wxyz; draw(wxyz); });
-  addEventListener("DOMContentLoaded", () => {
-    node = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    node.id = "kb-axes";
-    node.setAttribute("viewBox", "0 0 72 72");
-    node.setAttribute("aria-hidden", "true");
-    document.body.append(node);
-    if (last) draw(last);
-  });
+  viserPage.watchCamera(draw);
 })();

@@ -3,6 +3,7 @@
 // their answers. viser brings its name, in hidden HTML, with each new session. A connection that is lost is opened again, and
 // what was not confirmed is sent again: each message counts once. A new session must not act on messages to the one before.
 const channel = (() => {
+  const PATIENCE = 3000; // ms for an answer, then `newest` sends the next value
   const PROTOCOL = "kinboard-1";
   const REPLACED = 4000; // code of a connection that a newer one of this page replaces
   const UNREADABLE = [1007, 1008]; // of one that a message has ended
@@ -156,6 +157,46 @@ const channel = (() => {
     open();
   }, 1000);
 
+  /** Sends what changes often to a feature: of each key the newest value, and one at a time, however long an answer takes. */
+  function newest(feature) {
+    const latest = new Map(); // what waits: key as text → [key, value]
+    let busy = 0; // the resting of the one that waits for its answer
+    let resting = 0, due = 0; // of the next one
+    const act = ([key, value], done) => send("feature", [feature, key, value], done);
+    function push() {
+      clearTimeout(resting);
+      if (busy || !latest.size) return;
+      const rest = due - performance.now();
+      if (rest > 0) { resting = setTimeout(push, rest); return; }
+      const [[text, first]] = latest;
+      latest.delete(text);
+      const mine = busy = setTimeout(next, PATIENCE);
+      function next() {
+        if (busy !== mine) return;
+        clearTimeout(busy);
+        busy = 0;
+        push();
+      }
+      act(first, next);
+    }
+    addEventListener("kinboard-connect", () => { latest.clear(); clearTimeout(busy); busy = 0; });
+    return {
+      /** Send this value once the one before is answered, and no other has come for some ms. */
+      send(key, value, pause = 0) {
+        latest.set(JSON.stringify(key), [key, value]);
+        due = performance.now() + pause;
+        push();
+      },
+      /** Send everything now, before something else. */
+      flush() {
+        for (const each of latest.values()) act(each);
+        latest.clear();
+      },
+      /** Whether everything is sent and answered. */
+      rests: () => !busy && !latest.size,
+    };
+  }
+
   viserPage.watch(() => {
     const found = document.querySelector("[data-channel]")?.dataset.channel ?? name;
     if (found === name) return;
@@ -200,6 +241,7 @@ const channel = (() => {
     watchSent: (act) => { sendWatchers.push(act); },
     /** The number of the last message that the values follow. */
     followed: () => followed,
+    newest,
     /** The value of a key, or undefined. */
     value: (key) => values.get(key),
     /** Call `act` with the value of each notice of this name. */

@@ -28,23 +28,17 @@
     }
     const address = $("[data-class-address]");
     const room = new URL("../room", location.href).href.replace(/^https?:\/\//, "");
-    if (address && address.textContent !== room) address.textContent = room;
-    for (const node of document.querySelectorAll("[data-class-hidden-in]")) {
-      node.hidden = viserPage.openTitles().includes(node.dataset.classHiddenIn);
-    }
+    dom.set(address, "textContent", room);
+    for (const node of dom.all("[data-class-hidden-in]")) node.hidden = viserPage.openTitles().includes(node.dataset.classHiddenIn);
   }
   // The page's address is its link. static/viewer.js copies it.
-  document.addEventListener("click", (event) => {
-    const button = event.target instanceof Element ? event.target.closest("[data-class-here]") : null;
-    if (button) button.parentElement.querySelector("code").textContent = location.href;
-  }, true);
+  dom.on("click", "[data-class-here]", (button) => { button.parentElement.querySelector("code").textContent = location.href; }, true);
 
   // A student's answers: kept in the tab until the service has taken them, and sent again over a new connection.
 
   const ANSWERS = "kinboard-answers";
-  const read = (name, none) => { try { return JSON.parse(sessionStorage.getItem(name)) ?? none; } catch { return none; } };
-  const keep = (name, value) => { try { sessionStorage.setItem(name, JSON.stringify(value)); } catch { /* only this page has it */ } };
-  let answers = read(ANSWERS, []); // { id, place, kind, value, since }
+  const keep = () => dom.tab.set(ANSWERS, JSON.stringify(answers)); // or only this page has them
+  let answers = JSON.parse(dom.tab.get(ANSWERS) ?? "[]"); // { id, place, kind, value, since }
   let sent = new Set(); // ids of answers that were sent over this connection
   const member = () => $("[data-class-bar]:not([data-class-bar=closed])");
   const student = () => $("[data-class-bar]:not([data-class-bar=teacher], [data-class-bar=closed])");
@@ -59,7 +53,7 @@
       sent.add(one.id);
       channel.send("feature", ["exercises", [one.kind, one.id, Date.now()], one.value], () => {
         answers = answers.filter((each) => each !== one);
-        keep(ANSWERS, answers);
+        keep();
         tell();
       });
     }
@@ -71,7 +65,7 @@
     if (answers.some((one) => one.place === place())) return; // a second press while the first is on its way
     const id = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
     answers.push({ id, place: place(), kind, value, since: Date.now() });
-    keep(ANSWERS, answers);
+    keep();
     deliver();
     setTimeout(tell, WAITING);
   });
@@ -87,9 +81,7 @@
   let online = true;
   let sure = 0; // until when (ms) the connection is not in doubt
   let asked = 0; // since when (ms) a sign of the service is awaited; 0: it is not
-  const note = document.createElement("div");
-  note.className = "kb-class-offline";
-  note.role = "status";
+  const note = $(".kb-class-offline");
   function tell() {
     const late = answers.filter((one) => Date.now() - one.since >= WAITING).length;
     const waits = answers.length && (late || !online) ? "Your answer is waiting, and is sent when the connection is back." : "";
@@ -97,9 +89,8 @@
     const words = online ? waits : `No connection. ${waits || kept}`;
     const shown = member() ? words : "";
     document.documentElement.toggleAttribute("data-kb-offline", Boolean(shown) && !online);
-    if (note.textContent !== shown) note.textContent = shown;
+    dom.set(note, "textContent", shown);
     note.hidden = !shown;
-    if (!note.isConnected && document.body) document.body.append(note);
   }
   function become(state) {
     online = state;

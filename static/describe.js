@@ -5,9 +5,8 @@
 (() => {
   const REST = 1000; // ms without a change until it is said
   const READY = "Ready"; // a title that is no news: app/viewer/panel/status.py
-  const hidden = (id) => Object.assign(document.createElement("div"), { id, className: "kb-hidden" });
-  const description = hidden("kb-scene");
-  const spoken = Object.assign(hidden("kb-says"), { role: "status" });
+  const description = document.getElementById("kb-scene");
+  const spoken = document.getElementById("kb-says");
   const textOf = (selector) => document.querySelector(selector)?.textContent.trim() ?? "";
 
   function tool() {
@@ -71,6 +70,5 @@
     scene.ariaLabel = "Scene with the robot arm";
     scene.setAttribute("aria-describedby", description.id);
   }
-  addEventListener("DOMContentLoaded", () => document.body.append(description, spoken));
   viserPage.watch(follow, { on: ["childList", "characterData"], delay: 200 });
 })();

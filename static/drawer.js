@@ -8,11 +8,9 @@
   const SMALL = matchMedia("(max-width: 36em), (max-height: 30em)"); // a picture that has nothing to give away
 
   if (root.dataset.kbEmbed) return;
-  let wanted = false;
-  // A browser may forbid storage; then a reload closes the drawer.
-  try { wanted = sessionStorage.getItem(SAVED) === "open"; } catch { /* see above */ }
+  let wanted = dom.tab.get(SAVED) === "open";
 
-  const parts = () => [...document.querySelectorAll("[data-wide]")].filter((node) => node.checkVisibility());
+  const parts = () => dom.all("[data-wide]").filter((node) => node.checkVisibility());
 
   /** How high the contents of a part are, with its border and padding, whatever height it has. */
   function contents(part) {
@@ -27,7 +25,7 @@
   const sizes = new ResizeObserver(() => requestAnimationFrame(show)); // what it changes are sizes again
   let measured = [];
   function measure() {
-    const nodes = [...document.querySelectorAll("[data-wide] > *")];
+    const nodes = dom.all("[data-wide] > *");
     if (nodes.length === measured.length && nodes.every((node, i) => node === measured[i])) return;
     measured = nodes;
     sizes.disconnect();
@@ -39,9 +37,7 @@
     measure();
     const shown = parts(), open = wanted && !SMALL.matches && shown.length > 0;
     if (open !== root.hasAttribute("data-kb-drawer")) root.toggleAttribute("data-kb-drawer", open);
-    for (const button of document.querySelectorAll("[data-wide-do]")) {
-      if (button.ariaPressed !== String(open)) button.ariaPressed = String(open);
-    }
+    for (const button of dom.all("[data-wide-do]")) dom.set(button, "ariaPressed", String(open));
     if (!open) return;
     const high = `${Math.ceil(Math.max(...shown.map(contents)))}px`;
     if (root.style.getPropertyValue("--kb-contents") !== high) root.style.setProperty("--kb-contents", high);
@@ -49,13 +45,11 @@
 
   function toggle() {
     wanted = !root.hasAttribute("data-kb-drawer");
-    try { sessionStorage.setItem(SAVED, wanted ? "open" : ""); } catch { /* see above */ }
+    dom.tab.set(SAVED, wanted ? "open" : "");
     show();
   }
 
-  addEventListener("click", (event) => {
-    if (event.target instanceof Element && event.target.closest("[data-wide-do]")) toggle();
-  });
+  dom.on("click", "[data-wide-do]", toggle);
   addEventListener("keydown", (event) => {
     if (event.code !== "KeyB" || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || event.repeat) return;
     const typing = event.target.matches("input:not([type=checkbox], [type=radio], [type=range]), textarea, select, [contenteditable]");

@@ -16,9 +16,9 @@
   const KEPT_CLEAR = "[data-status], [data-class-bar], #kb-tools, #kb-grip, #kb-axes, .kb-key";
 
   if (document.documentElement.dataset.kbEmbed) return; // another page explains
-  let done = "";
-  try { done = localStorage.getItem(STORE) ?? ""; } catch { return; } // cannot be remembered: no hints
-  const open = new Map(HINTS.filter((hint) => !done.split(" ").includes(hint.key)).map((hint) => [hint.key, hint]));
+  const done = dom.browser.get(STORE);
+  if (done === undefined) return; // cannot be remembered: no hints
+  const open = new Map(HINTS.filter((hint) => !(done ?? "").split(" ").includes(hint.key)).map((hint) => [hint.key, hint]));
   if (!open.size) return;
 
   const visible = (box) => box && box.width > 0 && box.top >= 0 && box.bottom <= innerHeight && box.left < innerWidth;
@@ -59,25 +59,17 @@
   function close(key) {
     if (!open.delete(key)) return;
     remove(key);
-    try { localStorage.setItem(STORE, HINTS.filter((hint) => !open.has(hint.key)).map((hint) => hint.key).join(" ")); } catch { /* as above */ }
+    dom.browser.set(STORE, HINTS.filter((hint) => !open.has(hint.key)).map((hint) => hint.key).join(" "));
     if (open.size) draw();
     else clearInterval(timer);
   }
   function remove(key) { document.querySelector(`.kb-hint[data-hint="${key}"]`)?.remove(); }
 
   function bubble(hint) {
-    const node = document.createElement("div");
-    node.className = "kb-hint";
-    node.dataset.hint = hint.key;
-    node.setAttribute("role", "note");
-    const text = document.createElement("span");
-    text.textContent = hint.text;
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = "×";
-    button.setAttribute("aria-label", `Close the hint: ${hint.text}`);
+    const button = dom.element("button", { type: "button", ariaLabel: `Close the hint: ${hint.text}` }, "×");
     button.addEventListener("click", () => close(hint.key));
-    node.append(text, button);
+    const node = dom.element("div", { className: "kb-hint", role: "note" }, dom.element("span", {}, hint.text), button);
+    node.dataset.hint = hint.key;
     document.body.append(node);
     return node;
   }
@@ -152,7 +144,7 @@
     if (!seen) return;
     const titles = viserPage.openTitles();
     if (titles.includes("Learn")) close("learn");
-    const clear = [...document.querySelectorAll(KEPT_CLEAR), ...viserPage.thumbs()];
+    const clear = [...dom.all(KEPT_CLEAR), ...viserPage.thumbs()];
     const taken = clear.map((node) => node.getBoundingClientRect()).filter((box) => box.width > 0);
     let placed = 0;
     for (const hint of open.values()) {

@@ -6,6 +6,7 @@
   const DECIMALS = 1e9;
   // Letters that move the target: axis and direction. The same places on QWERTY, QWERTZ and AZERTY keyboards.
   const MOVES = { KeyL: [0, 1], KeyJ: [0, -1], KeyI: [1, 1], KeyK: [1, -1], KeyO: [2, 1], KeyU: [2, -1] };
+  const { on } = dom;
   const { type, thumbOf: thumb } = viserPage;
   const { send } = channel;
 
@@ -49,20 +50,14 @@
       input.dispatchEvent(new Event("kinboard-accept"));
     }
   }
-  addEventListener("pointerdown", (event) => { if (viserPage.isSlider(event.target) || event.target.closest?.("canvas, button")) accept(); }, true);
+  addEventListener("pointerdown", ({ target }) => { if (viserPage.isSlider(target) || dom.closest(target, "canvas, button")) accept(); }, true);
 
   function addField(id, field, line) {
-    const box = document.createElement("span");
-    box.className = "kb-field";
-    const input = document.createElement("input");
     // The keys for decimals of some phones have no minus.
     const keys = valueOf(thumb(id), "min") < 0 ? "text" : "decimal";
-    Object.assign(input, { type: "text", inputMode: keys, autocomplete: "off", spellcheck: false });
-    const unit = document.createElement("span");
-    unit.className = "kb-field-unit";
-    unit.textContent = field.unit;
-    box.append(input, unit);
-    line.append(box);
+    const input = dom.element("input", { type: "text", inputMode: keys, autocomplete: "off", spellcheck: false });
+    const unit = dom.element("span", { className: "kb-field-unit" }, field.unit);
+    line.append(dom.element("span", { className: "kb-field" }, input, unit));
     line.dataset.kbLine = "";
     const slider = thumb(id);
     input.setAttribute("aria-label", `${viserPage.labelOf(slider)} (${field.unit})`);
@@ -109,7 +104,7 @@
     for (const button of viserPage.buttons()) {
       const number = button.textContent.replace(LOCKED, "");
       const pressed = /^\d$/.test(number) ? String(button.textContent.startsWith(LOCKED)) : null;
-      if (button.ariaPressed !== pressed) button.ariaPressed = pressed;
+      dom.set(button, "ariaPressed", pressed);
     }
   }
 
@@ -230,8 +225,7 @@
     const text = box.querySelector("textarea");
     box.querySelector("[data-typed-error]").textContent = error;
     box.querySelector("[data-typed-readings]").replaceChildren(...readings.map(([label, reading]) => {
-      const button = document.createElement("button");
-      Object.assign(button, { type: "button", textContent: label });
+      const button = dom.element("button", { type: "button" }, label);
       button.addEventListener("click", () => { text.value = reading; sendForm(); text.focus(); });
       return button;
     }));
@@ -247,32 +241,26 @@
     });
   }
 
-  addEventListener("click", (event) => {
-    const target = event.target instanceof Element ? event.target : document.body;
-    const button = target.closest("[data-send]");
-    if (button && button.ariaDisabled !== "true") send(button.dataset.send, button.dataset.argument);
-    if (target.closest("[data-typed-send]")) sendForm();
-    if (target.closest("[data-typed-close]")) closeForm();
-    const pressed = target.closest("[data-type]");
-    if (!pressed || (pressed.localName !== "button" && !getSelection().isCollapsed)) return; // its numbers are being marked
+  on("click", "[data-send]:not([aria-disabled=true])", ({ dataset }) => send(dataset.send, dataset.argument));
+  on("click", "[data-typed-send]", sendForm);
+  on("click", "[data-typed-close]", closeForm);
+  on("click", "[data-type]", (pressed, { target }) => {
+    if (pressed.localName !== "button" && !getSelection().isCollapsed) return; // its numbers are being marked
     if (target.closest("button")?.ariaExpanded === "true") closeForm();
     else openForm(pressed.dataset.type);
   });
 
-  addEventListener("input", (event) => {
-    if (event.target.matches?.("[data-typed] textarea")) showError(""); // readings of another text are none of this one
-  });
+  on("input", "[data-typed] textarea", () => showError("")); // readings of another text are none of this one
 
-  addEventListener("change", (event) => {
-    if (event.target.matches?.("[data-frame]")) {
-      if (form() && !form().hidden) closeForm(); // its numbers are in the frame of before
-      send("frame", event.target.value);
-    }
-    if (!event.target.matches?.("[data-typed-frame]")) return;
+  on("change", "[data-frame]", (choice) => {
+    if (form() && !form().hidden) closeForm(); // its numbers are in the frame of before
+    send("frame", choice.value);
+  });
+  on("change", "[data-typed-frame]", (choice) => {
     // From where the tool is, everything is zero; in the frame above, the present numbers.
     const kind = form().dataset.typed;
     const input = form().querySelector("textarea");
-    if (event.target.value) input.value = JSON.parse(form().dataset.none)[kind];
+    if (choice.value) input.value = JSON.parse(form().dataset.none)[kind];
     else openForm(kind);
     input.focus();
   });
@@ -303,19 +291,17 @@
     if (held) send("released");
     held = null;
   }
-  addEventListener("pointerdown", (event) => {
-    const button = event.target.closest?.("[data-pad]");
-    if (!button || event.button !== 0) return;
+  on("pointerdown", "[data-pad]", (button, event) => {
+    if (event.button !== 0) return;
     stopJog();
     held = button;
     jog(button);
     jogAgain(HELD);
   });
   for (const kind of ["pointerup", "pointercancel", "blur"]) addEventListener(kind, stopJog);
-  addEventListener("contextmenu", (event) => { if (event.target.closest?.("[data-pad]")) event.preventDefault(); }); // a long touch
-  addEventListener("click", (event) => {
-    const button = event.target.closest?.("[data-pad]");
-    if (!button || event.detail !== 0) return;
+  on("contextmenu", "[data-pad]", (_, event) => event.preventDefault()); // a long touch
+  on("click", "[data-pad]", (button, event) => {
+    if (event.detail !== 0) return;
     jog(button); // by a key
     send("released");
   });

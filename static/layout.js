@@ -15,19 +15,11 @@
   // Factors of the text sizes in the tab View, as in layout.css.
   const TEXT = "kinboard-text-size";
   const SIZES = { Normal: 1, Large: 1.3, Projector: 1.7 };
-  let size = "Normal";
-  try {
-    const kept = localStorage.getItem(TEXT);
-    if (Object.hasOwn(SIZES, kept)) size = kept;
-  } catch { /* a browser may forbid storage */ }
+  let size = Object.hasOwn(SIZES, dom.browser.get(TEXT)) ? dom.browser.get(TEXT) : "Normal";
 
-  let step = STEPS.includes(stored()) ? stored() : "half";
+  let step = STEPS.includes(dom.tab.get(SAVED)) ? dom.tab.get(SAVED) : "half";
   let drag = null; // { y, height, moved, speed, at } while a pointer holds the sheet
-  let grip = null;
-
-  // A browser may forbid storage; then a reload opens the sheet half.
-  function stored() { try { return sessionStorage.getItem(SAVED); } catch { return null; } }
-  function store() { try { sessionStorage.setItem(SAVED, step); } catch { /* see above */ } }
+  const grip = document.getElementById("kb-grip");
 
   const card = () => document.querySelector("[data-status]");
 
@@ -48,16 +40,14 @@
     root.style.setProperty("--kb-below", `${heightOf(step === "peek" ? "peek" : "half")}px`);
     root.style.setProperty("--kb-above", `${STATUS}px`);
     tellSize();
-    if (grip) {
-      grip.hidden = !NARROW.matches;
-      grip.ariaLabel = `Panel: ${step === "peek" ? "closed" : `${step} height`}. Press to change its height.`;
-      grip.ariaExpanded = String(step !== "peek");
-    }
+    grip.hidden = !NARROW.matches;
+    grip.ariaLabel = `Panel: ${step === "peek" ? "closed" : `${step} height`}. Press to change its height.`;
+    grip.ariaExpanded = String(step !== "peek");
   }
 
   function choose(name) {
     step = name;
-    store();
+    dom.tab.set(SAVED, step);
     place();
   }
 
@@ -69,11 +59,7 @@
     choose(STEPS.reduce((best, name) => (near(name) < near(best) ? name : best)));
   }
 
-  const held = (event) => {
-    if (!(event.target instanceof Element) || !NARROW.matches) return false;
-    if (event.target.closest("#kb-grip")) return true;
-    return event.target.closest("[data-kb-head]") !== null && !event.target.closest("button, input, a");
-  };
+  const held = ({ target }) => NARROW.matches && (target === grip || (dom.closest(target, "[data-kb-head]") && !dom.closest(target, "button, input, a")));
 
   addEventListener("pointerdown", (event) => {
     if (drag || !event.isPrimary || event.button !== 0 || !held(event)) return;
@@ -137,20 +123,12 @@
   const WIDTH = "kinboard-panel-width";
   const STRIDE = 24; // px; for one key
   const LEAST = 200; // px; a narrower panel is folded away
-  let wished = NaN; // width of the last visit, until the panel has it
-  try { wished = Number(localStorage.getItem(WIDTH) ?? NaN); } catch { /* see above */ }
+  const kept = () => Number(dom.browser.get(WIDTH) ?? NaN); // width that the visitor has chosen
+  const chosen = () => kept() >= LEAST;
+  let wished = kept(); // width of the last visit, until the panel has it
 
-  const chosen = () => { try { return Number(localStorage.getItem(WIDTH)) >= LEAST; } catch { return false; } };
-
-  // Where the visitor has chosen no width, it follows that of the window: from one width of the window and the panel to
-  // the next, in proportion between them.
-  const STANDARD = [[1180, 344], [1280, 380], [1440, 440], [1920, 520]];
-  function standard() {
-    const next = STANDARD.findIndex(([wide]) => wide >= innerWidth);
-    if (next <= 0) return next ? STANDARD.at(-1)[1] : STANDARD[0][1];
-    const [[wide, panel], [wider, more]] = STANDARD.slice(next - 1, next + 1);
-    return panel + (more - panel) * (innerWidth - wide) / (wider - wide);
-  }
+  // Where the visitor has chosen no width, it follows that of the window: 380 px of 1280, 440 of 1440, 520 of 1920 and more.
+  const standard = () => Math.min(Math.max(344, Math.min(0.375 * innerWidth - 100, innerWidth / 6 + 200)), 520);
   const usual = () => Math.min(Math.round(SIZES[root.dataset.kbText] * standard()), innerWidth / 2);
 
   let fresh = !(wished >= LEAST); // nobody has chosen a width in this browser
@@ -173,10 +151,8 @@
       return;
     }
     if (!byHand) return;
-    try {
-      if (Math.abs(width - usual()) < 2) localStorage.removeItem(WIDTH);
-      else localStorage.setItem(WIDTH, String(width));
-    } catch { /* see above */ }
+    if (Math.abs(width - usual()) < 2) dom.browser.remove(WIDTH);
+    else dom.browser.set(WIDTH, String(width));
   }
   addEventListener("pointerdown", (event) => {
     byHand ||= event.isTrusted && event.target instanceof Node && viserPage.region()?.edge.contains(event.target);
@@ -197,13 +173,13 @@
 
   function chooseSize(name) {
     const width = viserPage.region()?.node.offsetWidth ?? 0;
-    const [factor, kept] = [SIZES[name] / SIZES[size], chosen()];
+    const [factor, isOwn] = [SIZES[name] / SIZES[size], chosen()];
     size = name;
-    byHand ||= kept; // the chosen width grows with the text
-    try { localStorage.setItem(TEXT, size); } catch { /* see above */ }
+    byHand ||= isOwn; // the chosen width grows with the text
+    dom.browser.set(TEXT, size);
     place();
     markSize();
-    if (width >= LEAST && factor !== 1) viserPage.widen((kept ? Math.min(factor * width, innerWidth / 2) : usual()) - width);
+    if (width >= LEAST && factor !== 1) viserPage.widen((isOwn ? Math.min(factor * width, innerWidth / 2) : usual()) - width);
   }
 
   /** Labels in the scene have the size of the text too: the server draws them. A new panel has not heard of it. */
@@ -217,15 +193,10 @@
   }
 
   function markSize() {
-    for (const button of document.querySelectorAll("[data-text-size]")) {
-      const pressed = String(button.dataset.textSize === size);
-      if (button.ariaPressed !== pressed) button.ariaPressed = pressed;
-    }
+    for (const button of dom.all("[data-text-size]")) dom.set(button, "ariaPressed", String(button.dataset.textSize === size));
   }
 
-  addEventListener("click", (event) => {
-    const button = event.target instanceof Element ? event.target.closest("[data-text-size]") : null;
-    if (!button) return;
+  dom.on("click", "[data-text-size]", (button) => {
     const before = root.dataset.kbText;
     chooseSize(button.dataset.textSize);
     // Who may only look can tell the service the size of labels only while the page opens; the view stays.
@@ -266,7 +237,7 @@
   }
 
   // A press hides the hint of a control until the pointer comes to another control.
-  const lineOf = (node) => viserPage.lineAt(node) ?? (node instanceof Element ? node.closest("button, input") : null);
+  const lineOf = (node) => viserPage.lineAt(node) ?? dom.closest(node, "button, input");
   let pressed = null;
   function press(line) {
     pressed = line;
@@ -275,13 +246,7 @@
   addEventListener("pointerdown", (event) => press(lineOf(event.target)), true);
   addEventListener("pointerover", (event) => { if (pressed && lineOf(event.target) !== pressed && !event.buttons) press(null); }, true);
 
-  addEventListener("DOMContentLoaded", () => {
-    grip = document.createElement("button");
-    grip.id = "kb-grip";
-    grip.type = "button";
-    document.body.append(grip);
-    place();
-  });
+  place();
   function follow() {
     root.style.setProperty("--kb-card", `${card()?.offsetHeight ?? 0}px`);
     mark();

@@ -2,6 +2,7 @@
 // Runs in viser's page: the steps of a lesson (app/viewer/lessons/guide), the exercises (app/viewer/exercises) and courses
 // (app/viewer/courses). It sends what is pressed and typed there.
 (() => {
+  const { on } = dom;
   let serial = 0; // each press is a step of its own in the history
   const ANSWERS = ["answer", "fields", "posture", "place"];
   // A block with data-feature belongs to that lesson, others to the block that all lessons have.
@@ -16,7 +17,6 @@
   }
 
   function press(button) {
-    if (button.ariaDisabled === "true") return;
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
     if (kind === "restart" && !button.closest("[data-feature]")) keepDrafts(drafts.filter(([each]) => !each.startsWith(`${placeOf(button)} `)));
     if (kind === "check") check(button);
@@ -24,30 +24,20 @@
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
   }
   // The typed cells of an exercise, row by row.
-  const cells = (block) => [...block.querySelectorAll("[data-row]")].map((row) => [...row.querySelectorAll("[data-cell]")].map((cell) => cell.value));
+  const cells = (block) => dom.all("[data-row]", block).map((row) => dom.all("[data-cell]", row).map((cell) => cell.value));
   // All fields of a block together.
   function check(node) {
-    const fields = node.closest("[data-feature]").querySelectorAll("input[data-guide-field]");
-    send(node, "check", Object.fromEntries([...fields].map((field) => [field.dataset.guideField, field.value])));
+    const fields = dom.all("input[data-guide-field]", node.closest("[data-feature]"));
+    send(node, "check", Object.fromEntries(fields.map((field) => [field.dataset.guideField, field.value])));
   }
 
-  addEventListener("click", (event) => {
-    const button = event.target instanceof Element ? event.target.closest("[data-guide-do]") : null;
-    if (button) press(button);
-  });
+  on("click", "[data-guide-do]:not([aria-disabled=true])", press);
   // Texts and choices that are sent when they have changed, and files.
-  addEventListener("change", (event) => {
-    const target = event.target;
-    if (target.matches?.("[data-guide-change]")) send(target, "set", target.value, target.dataset.guideChange);
-    if (target.matches?.("[data-guide-file]")) upload(target);
-  });
-  addEventListener("click", (event) => {
-    event.target.closest?.("[data-guide-open]")?.parentElement.querySelector("[data-guide-file]").click();
-  });
+  on("change", "[data-guide-change]", (field) => send(field, "set", field.value, field.dataset.guideChange));
+  on("change", "[data-guide-file]", upload);
+  on("click", "[data-guide-open]", (button) => button.parentElement.querySelector("[data-guide-file]").click());
   // A click in a map: where, as shares of its width and its height, from the left and from below.
-  addEventListener("click", ({ target, clientX, clientY }) => {
-    const map = target.closest?.("[data-guide-map]");
-    if (!map) return;
+  on("click", "[data-guide-map]", (map, { clientX, clientY }) => {
     const { left, bottom, width, height } = map.querySelector("image").getBoundingClientRect();
     const [x, y] = [(clientX - left) / width, (bottom - clientY) / height];
     if (x >= 0 && x <= 1 && y >= 0 && y <= 1) send(map, "map", [x, y]);
@@ -70,11 +60,10 @@
   const DRAFTS = "kinboard-drafts";
   const MOST_DRAFTS = 20; // questions
   const TYPED = ":is(input, textarea)[data-cell]:not([readonly])";
-  let drafts = []; // [question, { cell: [what is typed, what the service said before] }], the newest first
-  try { drafts = JSON.parse(sessionStorage.getItem(DRAFTS)) ?? []; } catch { /* nothing was kept */ }
+  let drafts = JSON.parse(dom.tab.get(DRAFTS) ?? "[]"); // [question, { cell: [what is typed, what the service said before] }], the newest first
   function keepDrafts(now) {
     drafts = now.slice(0, MOST_DRAFTS);
-    try { sessionStorage.setItem(DRAFTS, JSON.stringify(drafts)); } catch { /* only this page has it */ }
+    dom.tab.set(DRAFTS, JSON.stringify(drafts));
   }
   const placeOf = (node) => node.closest("[data-of]")?.dataset.of;
   /** The question of a typed cell, with arm and words in a lesson, with its variant in an exercise; undefined: it is no answer. */
@@ -83,10 +72,10 @@
     return asked ? `${placeOf(cell)} ${asked.dataset.question} ${asked.querySelector("legend")?.textContent}` : placeOf(cell);
   }
   const draftOf = (question) => drafts.find(([each]) => each === question)?.[1];
-  addEventListener("input", ({ target }) => {
-    const question = target.matches?.(TYPED) ? questionOf(target) : undefined;
+  on("input", TYPED, (cell) => {
+    const question = questionOf(cell);
     if (question === undefined) return;
-    const typed = { ...draftOf(question), [target.dataset.cell]: [target.value, target.defaultValue] };
+    const typed = { ...draftOf(question), [cell.dataset.cell]: [cell.value, cell.defaultValue] };
     keepDrafts([[question, typed], ...drafts.filter(([each]) => each !== question)]);
   });
   /** What forgets the draft of a lesson's question once the service has it. Exercises do not show an answer again. */
@@ -100,7 +89,7 @@
   }
   let filled = new WeakMap(); // cell → what the service said when it was looked at
   function fill() {
-    for (const cell of document.querySelectorAll(`.kb-question ${TYPED}`)) {
+    for (const cell of dom.all(`.kb-question ${TYPED}`)) {
       if (filled.get(cell) === cell.defaultValue || cell.value !== cell.defaultValue) continue;
       filled.set(cell, cell.defaultValue);
       const [text, before] = draftOf(questionOf(cell))?.[cell.dataset.cell] ?? [];
@@ -112,16 +101,14 @@
 
   addEventListener("kinboard-connect", () => { filled = new WeakMap(); });
 
-  // Focus: kept when the server sends the block again; where its control is gone, the question or the block gets it.
-  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument", "data-cell", "data-guide-change"];
-  let focus = null; // selector of the control, and key of its question
+  // Focus: where its control is taken away, the question or the block gets it.
+  let focus = null; // selector of the block, and key of the question
   let gone = false; // the visitor has moved the focus away
-  addEventListener("focusin", (event) => {
-    const node = event.target.closest?.(".kb-guide :is([data-guide-do], [data-guide-field], [data-cell], [data-guide-change])");
+  addEventListener("focusin", ({ target }) => {
+    const node = dom.closest(target, ".kb-guide :is([data-guide-do], [data-guide-field], [data-cell], [data-guide-change])");
     gone = false;
     focus = node && {
       block: `[data-guide="${node.closest(".kb-guide").dataset.guide}"]`,
-      control: NAMES.filter((name) => node.hasAttribute(name)).map((name) => `[${name}="${node.getAttribute(name)}"]`).join(""),
       question: node.closest("[data-question]")?.dataset.question,
     };
   });
@@ -133,15 +120,14 @@
   function restore() {
     if (!focus || gone || document.activeElement !== document.body) return;
     const block = document.querySelector(focus.block);
-    const node = block?.querySelector(focus.control) ?? document.querySelector(`.kb-guide ${focus.control}`)
-      ?? block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
+    const node = block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
       ?? (block?.dataset.feature && block.querySelector(".kb-question :is(button, input)"))
       ?? block?.querySelector(".kb-guide-turn button:last-child") ?? block?.querySelector("[data-first]");
     node?.focus({ preventScroll: true });
   }
   // What is said to an answer is seen, with its reason, unless the visitor has gone on meanwhile.
   let expected = null; // { words, before }: where it will be, and what is there now
-  const wordsAt = (selector) => [...document.querySelectorAll(selector)].find((node) => node.textContent && node.getClientRects().length);
+  const wordsAt = (selector) => dom.all(selector).find((node) => node.textContent && node.getClientRects().length);
   function expectWords(node, kind) {
     if (![...ANSWERS, "check", "reveal"].includes(kind)) return;
     const key = node.closest("[data-question]")?.dataset.question;

@@ -2,76 +2,31 @@
 // Runs in viser's page: the table of the tab Robot (app/viewer/tabs/robot). It sends what is typed, cell by cell, and one
 // message at a time, so that a slow answer delays only itself. What was typed since the last answer stays and is sent.
 (() => {
+  const { on } = dom;
   const PAUSE = 40; // ms after a key until a cell is sent
   const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
-  const PATIENCE = 3000; // ms for an answer, then the next message is sent
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
+  const CELL = "[data-arm] [data-cell]";
+  const ROW = "[data-arm] tr[data-row]";
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
+  const doer = (name) => part("table").querySelector(`[data-arm-do="${name}"]`);
   const revision = () => Number(part("table")?.dataset.revision ?? 0);
   const anyWrong = () => document.querySelector('[data-arm^="wrong"]:not([hidden])') !== null;
   const send = (key, value, done) => channel.send("feature", ["robot", key, value], done);
 
   // Typed cells
 
-  const typed = new Map(); // cell → revision and text, not sent yet
-  let sent = null; // the same of the message that waits for its answer
-  let busy = 0; // the timer of the message that waits for its answer
-  let pause = 0; // the timer of `push`
-  let due = 0; // when it ends
-  function answered() { clearTimeout(busy); busy = 0; sent = null; }
-  addEventListener("kinboard-connect", () => { typed.clear(); answered(); });
-
+  const typed = channel.newest("robot");
   function keyOf(name) {
     const [where, column] = name.split(" ");
     return column === undefined ? [name] : ["cell", /^\d+$/.test(where) ? Number(where) : where, column];
   }
-
-  function push() {
-    clearTimeout(pause);
-    if (busy || !typed.size) return;
-    const [[name, value]] = typed;
-    typed.delete(name);
-    sent = [name, value];
-    const next = () => { answered(); pushLater(); };
-    busy = setTimeout(next, PATIENCE);
-    send(keyOf(name), value, next);
-  }
-
-  /** Send what was typed, once typing has rested. */
-  function pushLater() {
-    clearTimeout(pause);
-    pause = setTimeout(push, Math.max(0, due - performance.now()));
-  }
-
-  /** Write what the server has not read yet into fields that it has written. Rows that moved are others: theirs is gone. */
-  function keepTyped() {
-    for (const [name, [rows, text]] of new Map([...(sent ? [sent] : []), ...typed])) {
-      const cell = document.querySelector(`[data-arm] input[data-cell="${name}"]`);
-      const same = rows === revision() || !/^\d/.test(name);
-      if (!same) typed.delete(name);
-      else if (cell && cell.value !== text) cell.value = text;
-    }
-  }
-
-  /** Send everything that was typed, before something else is sent. */
-  function flush() {
-    clearTimeout(pause);
-    for (const [name, value] of typed) send(keyOf(name), value);
-    typed.clear();
-  }
-
-  addEventListener("input", (event) => {
-    const cell = event.target.closest?.("[data-arm] input[data-cell]");
-    if (!cell) return;
-    typed.set(cell.dataset.cell, [revision(), cell.value]);
-    due = performance.now() + (part("files")?.hasAttribute("data-meshes") ? REST : PAUSE);
-    pushLater();
+  on("input", "[data-arm] input[data-cell]", (cell) => {
+    typed.send(keyOf(cell.dataset.cell), [revision(), cell.value], part("files")?.hasAttribute("data-meshes") ? REST : PAUSE);
   });
-  addEventListener("change", (event) => {
-    const choice = event.target.closest?.("[data-arm] select[data-cell]");
-    if (!choice) return;
-    flush();
+  on("change", "[data-arm] select[data-cell]", (choice) => {
+    typed.flush();
     const key = keyOf(choice.dataset.cell);
     if (key[0] === "start") coming = 0; // the other arm has rows of its own
     send(key, key[0] === "cell" ? [revision(), choice.value] : choice.value);
@@ -84,19 +39,15 @@
   let coming = 0; // which of these is the last that is still to come; 0: none
   addEventListener("kinboard-connect", () => { coming = 0; });
   function mark() {
-    const rows = [...document.querySelectorAll("[data-arm] tr[data-row]")];
+    const rows = dom.all(ROW);
     if (!rows.length) return;
     if (here < rows.length) coming = 0;
     if (!coming) here = Math.min(here, rows.length - 1);
     const at = Math.min(here, rows.length - 1);
     rows.forEach((row, i) => row.classList.toggle("kb-here", i === at));
-    const label = document.querySelector("[data-arm-here]");
-    if (label.textContent !== `Row ${at + 1}`) label.textContent = `Row ${at + 1}`;
+    dom.set(document.querySelector("[data-arm-here]"), "textContent", `Row ${at + 1}`);
     const able = { up: at > 0, down: at < rows.length - 1, remove: rows.length > 1, add: true };
-    for (const [name, yes] of Object.entries(able)) {
-      const button = part("table").querySelector(`[data-arm-do="${name}"]`);
-      if (button.ariaDisabled !== String(!yes)) button.ariaDisabled = String(!yes);
-    }
+    for (const [name, yes] of Object.entries(able)) dom.set(doer(name), "ariaDisabled", String(!yes));
   }
 
   /** The answer to a new row comes with the table, or says that there is none. */
@@ -106,7 +57,7 @@
   }
 
   function change(action) {
-    flush();
+    typed.flush();
     if (action === "add") coming = ++added;
     const row = added;
     send(["row", action, here], null, action === "add" ? () => answeredRow(row) : null);
@@ -120,27 +71,26 @@
   let focus = null; // a selector of the field that has it
   let moves = false; // its row moves
   let left = 0;
-  addEventListener("focusin", (event) => {
-    const row = event.target.closest?.("[data-arm] tr[data-row]");
+  addEventListener("focusin", ({ target }) => {
+    const row = dom.closest(target, ROW);
     if (row) { here = Number(row.dataset.row); mark(); }
-    const cell = event.target.closest?.("[data-arm] [data-cell]");
+    const cell = dom.closest(target, CELL);
     const name = cell ? `[data-cell="${cell.dataset.cell}"]` : null;
     clearTimeout(left);
     if (cell?.matches("input") && name !== focus) cell.select();
-    if (focus && name !== focus) { flush(); channel.send("released"); }
+    if (focus && name !== focus) { typed.flush(); channel.send("released"); }
     if (focus && !cell) left = setTimeout(leave, LEFT);
     focus = name;
   });
-  addEventListener("focusout", (event) => {
-    const target = event.target;
-    if (event.relatedTarget || !target.closest?.("[data-arm] [data-cell]")) return;
+  on("focusout", CELL, (cell, event) => {
+    if (event.relatedTarget) return;
     // Browsers also report an element that they are about to remove; after that it is not connected.
-    queueMicrotask(() => { if (target.isConnected && document.activeElement === document.body) focus = null; });
-    if (target.isConnected) left = setTimeout(leave, LEFT);
+    queueMicrotask(() => { if (cell.isConnected && document.activeElement === document.body) focus = null; });
+    if (cell.isConnected) left = setTimeout(leave, LEFT);
   });
   function leave() {
-    if (document.activeElement?.closest("[data-arm] [data-cell]")) return;
-    flush();
+    if (dom.closest(document.activeElement, CELL)) return;
+    typed.flush();
     send(["left"], null);
   }
   function restore() {
@@ -155,27 +105,25 @@
   function neighbour(cell, down, right) {
     const row = cell.closest("tr");
     if (!row) return undefined;
-    const line = [...row.querySelectorAll("[data-cell]")];
+    const line = dom.all("[data-cell]", row);
     if (right) return line[line.indexOf(cell) + right];
     const other = down > 0 ? row.nextElementSibling : row.previousElementSibling;
     return other?.querySelector(`[data-cell$=" ${cell.dataset.cell.split(" ")[1]}"]`);
   }
 
-  addEventListener("keydown", (event) => {
-    const cell = event.target.closest?.("[data-arm] [data-cell]");
-    if (!cell) return;
+  on("keydown", CELL, (cell, event) => {
     const undo = (event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase();
     const inTable = cell.closest("tr[data-row]") !== null;
     let to = null;
     if (undo === "z" || undo === "y") {
-      flush();
+      typed.flush();
       if (anyWrong()) send(["discard"], null);
       else channel.send(undo === "y" || event.shiftKey ? "redo" : "undo");
     } else if (event.altKey && inTable && ["ArrowUp", "ArrowDown", "Enter"].includes(event.key)) {
       const action = { ArrowUp: "up", ArrowDown: "down", Enter: "add" }[event.key];
-      if (part("table").querySelector(`[data-arm-do="${action}"]`).ariaDisabled !== "true") change(action);
+      if (doer(action).ariaDisabled !== "true") change(action);
     } else if (event.key === "Escape" && anyWrong()) {
-      flush();
+      typed.flush();
       send(["discard"], null);
     } else if (!cell.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
     else if (event.key === "Enter" && !cell.closest("tr")) cell.blur();
@@ -199,28 +147,21 @@
     if (!box?.clientWidth) return;
     box.classList.toggle("kb-arm-whole", box.scrollWidth <= box.clientWidth + 1);
     const words = box.scrollLeft > 8 ? "‹ Numbers" : "Limits ›";
-    const button = part("table").querySelector("[data-arm-more]");
-    if (button.textContent !== words) button.textContent = words;
+    dom.set(part("table").querySelector("[data-arm-more]"), "textContent", words);
   }
   addEventListener("scroll", (event) => { if (event.target === scroller()) showMore(); }, true);
   const resized = new ResizeObserver(showMore);
 
   // Buttons
 
-  addEventListener("click", (event) => {
-    const target = event.target instanceof Element ? event.target : document.body;
-    const row = target.closest("[data-arm-row]");
-    if (row) { here = Number(row.dataset.armRow); mark(); }
-    const button = target.closest("[data-arm-do]");
-    if (button && button.ariaDisabled !== "true") {
-      const action = button.dataset.armDo;
-      if (["add", "up", "down", "remove"].includes(action)) change(action);
-      else { flush(); send([action], button.dataset.argument ?? null); }
-    }
-    if (target.closest("[data-arm-more]")) {
-      const box = scroller();
-      box.scrollTo({ left: box.scrollLeft > 8 ? 0 : box.scrollWidth, behavior: "smooth" });
-    }
+  on("click", "[data-arm-row]", (row) => { here = Number(row.dataset.armRow); mark(); });
+  on("click", "[data-arm-do]:not([aria-disabled=true])", ({ dataset: { armDo: action, argument = null } }) => {
+    if (["add", "up", "down", "remove"].includes(action)) change(action);
+    else { typed.flush(); send([action], argument); }
+  });
+  on("click", "[data-arm-more]", () => {
+    const box = scroller();
+    box.scrollTo({ left: box.scrollLeft > 8 ? 0 : box.scrollWidth, behavior: "smooth" });
   });
 
   // A file with several ends or robots asks which. That stands below the table, far from where a file was dropped.
@@ -235,7 +176,6 @@
   viserPage.watch(showChoice);
   viserPage.watch(() => {
     if (!part("table")) return;
-    keepTyped();
     restore();
     mark();
     resized.observe(scroller());

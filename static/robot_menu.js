@@ -6,7 +6,7 @@
   let robots = {};
 
   function decorate() {
-    const options = document.querySelectorAll("[data-combobox-option]");
+    const options = dom.all("[data-combobox-option]");
     if (!options.length) return;
     const said = document.querySelector("[data-robots]")?.dataset.robots ?? "{}";
     if (said !== text) {

@@ -15,16 +15,12 @@
     opened = null;
   }
 
-  addEventListener("click", (event) => {
-    const kind = event.target instanceof Element ? event.target.closest("[data-sheet-do]")?.dataset.sheetDo : null;
-    if (!kind) return;
-    if (kind === "png") document.querySelector('#kb-tools [aria-label="Save a picture of the scene"]').click();
-    else {
-      // Opened at once, within the click: later, a browser would take it for an unwanted window.
-      const page = kind === "page" ? window.open("../static/sheet.html") : null;
-      send(kind);
-      if (page) opened = { window: page, serial, ready: false };
-    }
+  dom.on("click", "[data-sheet-do]", ({ dataset: { sheetDo: kind } }) => {
+    if (kind === "png") { document.querySelector("[data-save-picture]").click(); return; }
+    // Opened at once, within the click: later, a browser would take it for an unwanted window.
+    const page = kind === "page" ? window.open("../static/sheet.html") : null;
+    send(kind);
+    if (page) opened = { window: page, serial, ready: false };
   });
   addEventListener("message", (event) => {
     if (event.origin !== location.origin || event.data !== "kinboard-sheet-ready" || event.source !== opened?.window) return;

@@ -28,15 +28,12 @@
 
   // Choosing and dropping
 
-  addEventListener("click", (event) => {
-    const button = event.target.closest?.("[data-arm-upload]");
-    if (button) document.querySelector(button.dataset.armUpload === "folder" ? "[data-arm-folder]" : "[data-arm-file]").click();
-    if (event.target.closest?.("[data-program-upload]")) document.querySelector("[data-program-file]").click();
-    if (event.target.closest?.('[data-arm-do="cancel"]')) end();
-  });
-  addEventListener("change", (event) => {
-    const input = event.target.closest?.("[data-arm-file], [data-arm-folder], [data-program-file]");
-    if (!input?.files.length) return;
+  const press = (selector) => document.querySelector(selector).click();
+  dom.on("click", "[data-arm-upload]", (button) => press(button.dataset.armUpload === "folder" ? "[data-arm-folder]" : "[data-arm-file]"));
+  dom.on("click", "[data-program-upload]", () => press("[data-program-file]"));
+  dom.on("click", "[data-arm-do=cancel]", end);
+  dom.on("change", "[data-arm-file], [data-arm-folder], [data-program-file]", (input) => {
+    if (!input.files.length) return;
     const files = [...input.files].map((file) => [file.webkitRelativePath || file.name, file]);
     const usual = input.matches("[data-program-file]") ? "program" : "arm";
     input.value = "";
@@ -112,14 +109,12 @@
 
   // The arm to compare with: its text is shown in the field, and sent
 
-  addEventListener("click", (event) => {
-    const button = event.target.closest?.("[data-compare-do]");
-    if (button?.dataset.compareDo === "open") document.querySelector("[data-compare-file]").click();
-    if (button?.dataset.compareDo === "send") sendFile(KINDS.arm, "your text", new Blob([document.querySelector("[data-compare-text]").value]), begin(), "other-text");
+  dom.on("click", "[data-compare-do=open]", () => press("[data-compare-file]"));
+  dom.on("click", "[data-compare-do=send]", () => {
+    sendFile(KINDS.arm, "your text", new Blob([document.querySelector("[data-compare-text]").value]), begin(), "other-text");
   });
-  addEventListener("change", async (event) => {
-    const input = event.target.closest?.("[data-compare-file]");
-    const [file] = input?.files ?? [];
+  dom.on("change", "[data-compare-file]", async (input) => {
+    const [file] = input.files;
     if (!file) return;
     input.value = "";
     const text = await file.slice(0, KINDS.arm.most + 1).text();

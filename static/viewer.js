@@ -9,22 +9,15 @@
   const TAB = "kinboard-tab";
   const embedded = window !== window.top; // whose history belongs to the outer page
 
-  // A browser may forbid storage; then only the URL keeps the state.
-  const recall = (name) => { try { return sessionStorage.getItem(name); } catch { return null; } };
-  const keep = (name, value) => { try { sessionStorage.setItem(name, value); } catch { /* see above */ } };
-
   const fragment = new URLSearchParams(location.hash.slice(1));
   const shared = fragment.has("s");
-  let state = fragment.get("s") ?? recall(STATE) ?? "";
-  let leftOff = ""; // where the last page with a lesson was, if this one begins anew
-  try { if (!state && !embedded) leftOff = localStorage.getItem(LEFT_OFF) ?? ""; } catch { /* see above */ }
+  let state = fragment.get("s") ?? dom.tab.get(STATE) ?? "";
+  // Where the last page with a lesson was, if this one begins anew.
+  const leftOff = state || embedded ? "" : dom.browser.get(LEFT_OFF) ?? "";
   document.documentElement.toggleAttribute("data-kb-left-off", leftOff !== "");
-  const leave = (value) => { try { if (!embedded) localStorage.setItem(LEFT_OFF, value); } catch { /* see above */ } };
-  addEventListener("click", (event) => {
-    if (event.target.closest?.("[data-left-off]")) location.hash = `s=${leftOff}&tab=Learn`; // which loads the page anew
-  });
-  let tab = fragment.get("tab") ?? (shared ? "" : recall(TAB)) ?? "";
-  if (shared) { keep(STATE, state); keep(TAB, tab); }
+  dom.on("click", "[data-left-off]", () => { location.hash = `s=${leftOff}&tab=Learn`; }); // which loads the page anew
+  let tab = fragment.get("tab") ?? (shared ? "" : dom.tab.get(TAB)) ?? "";
+  if (shared) { dom.tab.set(STATE, state); dom.tab.set(TAB, tab); }
 
   // Never connect to another server or play a recording, whatever the URL contains.
   const query = new URLSearchParams(location.search);
@@ -49,10 +42,12 @@
     if (tab) parts.push(`tab=${encodeURIComponent(tab)}`);
     return parts.length ? `${page}#${parts.join("&")}` : page;
   }
-  const show = () => { trail[at] = state; history.replaceState({ kinboard: at }, "", address()); aim(); };
-  function aim() {
-    const whole = document.getElementById("kb-open");
-    if (whole) whole.href = location.pathname + (state ? `#s=${state}` : "");
+  const whole = document.getElementById("kb-open"); // the link to the whole page
+  whole.hidden = !mode;
+  function show() {
+    trail[at] = state;
+    history.replaceState({ kinboard: at }, "", address());
+    whole.href = location.pathname + (state ? `#s=${state}` : "");
   }
 
   function add() {
@@ -77,7 +72,7 @@
     if (event.state?.kinboard === undefined) return;
     at = event.state.kinboard;
     state = new URLSearchParams(location.hash.slice(1)).get("s") ?? "";
-    keep(STATE, state);
+    dom.tab.set(STATE, state);
     show(); // the tab may be another one now
     if (!expected) dispatchEvent(new CustomEvent("kinboard-travel", { detail: at === loaded ? start() || state : state }));
     expected = false;
@@ -103,12 +98,13 @@
   });
   // A state of the page: a new one, the same from another viewpoint, or one that has an entry.
   for (const [kind, then] of [["state", add], ["state-replace", show], ["state-return", goBack]]) {
-    channel.on(kind, (value) => { state = value; keep(STATE, state); then(); });
+    channel.on(kind, (value) => { state = value; dom.tab.set(STATE, state); then(); });
   }
   channel.on("tab", (title) => { // of a command of the palette
     if (viserPage.openTab(title)) dispatchEvent(new CustomEvent("kinboard-tab", { detail: title }));
   });
-  channel.on("state-last", leave); // the same state, for the next page of this browser
+  // The same state, for the next page of this browser.
+  channel.on("state-last", (value) => { if (!embedded) dom.browser.set(LEFT_OFF, value); });
 
   // The controls appear some time after the state was requested, with the first tab open.
   function openTab(until) {
@@ -127,28 +123,17 @@
     if (!strip || !event.isTrusted) return;
     setTimeout(() => {
       const title = viserPage.openTitleIn(strip);
-      if (!title) return;
-      tab = title;
-      keep(TAB, tab);
-      show();
+      if (title) dispatchEvent(new CustomEvent("kinboard-tab", { detail: title }));
     }, 100);
   }
-  // A tab that was opened for the visitor.
+  // A tab that was opened, by the visitor or for them.
   addEventListener("kinboard-tab", (event) => {
     tab = event.detail;
-    keep(TAB, tab);
+    dom.tab.set(TAB, tab);
     show();
   });
   addEventListener("click", noteTab);
   addEventListener("keyup", noteTab);
-
-  addEventListener("DOMContentLoaded", () => {
-    if (!mode) return;
-    const whole = document.createElement("a");
-    Object.assign(whole, { id: "kb-open", target: "_blank", rel: "noopener", textContent: "Open in Kinboard ↗" });
-    document.body.append(whole);
-    aim();
-  });
 
   async function copy(code) {
     try {
@@ -161,12 +146,10 @@
     }
   }
 
-  addEventListener("click", async (event) => {
-    const button = event.target instanceof Element ? event.target.closest("button[data-copy]") : null;
-    const code = button?.closest("[data-copy-box]")?.querySelector("code");
-    if (!code) return;
+  dom.on("click", "button[data-copy]", async (button) => {
+    const code = button.closest("[data-copy-box]")?.querySelector("code");
+    if (!code || button.disabled) return;
     const before = button.textContent;
-    if (button.disabled) return;
     button.disabled = true;
     button.textContent = (await copy(code)) ? "Copied" : "Press Ctrl-C";
     setTimeout(() => { button.textContent = before; button.disabled = false; }, 1500);

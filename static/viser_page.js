@@ -43,8 +43,7 @@ const viserPage = (() => {
     Object.defineProperty(Navigator.prototype, "language", { get: () => languages[0] });
   }
 
-  const all = (selector, root = document) => [...root.querySelectorAll(selector)];
-  const closest = (node, selector) => (node instanceof Element ? node.closest(selector) : null);
+  const { all, closest } = dom;
   const textOf = (node) => node.textContent.trim();
 
   // Changes of the page: one observer for all scripts.
@@ -78,10 +77,8 @@ const viserPage = (() => {
   }
   /** The page was changed in a way that is not observed, as by other values of attributes. */
   const noteChange = () => dispatch([{ type: "childList" }]);
-  addEventListener("DOMContentLoaded", () => {
-    const what = { subtree: true, childList: true, characterData: true, attributeFilter: ATTRIBUTES };
-    new MutationObserver(dispatch).observe(document.documentElement, what);
-  });
+  const OBSERVED = { subtree: true, childList: true, characterData: true, attributeFilter: ATTRIBUTES };
+  new MutationObserver(dispatch).observe(document.documentElement, OBSERVED);
 
   // viser sends one change of the controls of a tab in 50 ms, the newest. So of buttons that are pressed within one moment,
   // as in a busy page, some would be lost, and letters typed right before a press: here presses take turns, and wait for
@@ -278,11 +275,9 @@ const viserPage = (() => {
   addEventListener("kinboard-there", () => {
     const found = lacks();
     if (!found.length) return;
-    const note = document.createElement("div"), close = document.createElement("button");
-    Object.assign(note, { id: "kb-lacks", role: "status", textContent: `This version of viser lacks ${found.join("; ")}. ` });
-    Object.assign(close, { type: "button", textContent: "Close" });
+    const close = dom.element("button", { type: "button" }, "Close");
+    const note = dom.element("div", { id: "kb-lacks", role: "status" }, `This version of viser lacks ${found.join("; ")}. `, close);
     close.addEventListener("click", () => note.remove());
-    note.append(close);
     document.body.append(note);
     console.warn(note.firstChild.textContent);
   }, { once: true });
@@ -335,12 +330,6 @@ const viserPage = (() => {
   function fieldOf(id) {
     return document.getElementById(id).nextElementSibling?.querySelector("input");
   }
-  function checkBox(text) {
-    const label = all("label").find((node) => node.textContent === text);
-    const line = lineAt(label)?.parentElement;
-    const box = line?.querySelector("input[type=checkbox]");
-    return box ? { box, line } : null;
-  }
   /** The text in the field with this label, or "". */
   function valueOf(text) {
     const label = all(PARTS.label).find((node) => node.textContent === text);
@@ -378,7 +367,7 @@ const viserPage = (() => {
         if (!button.ariaLabel) name(button, text);
       }
     }
-    for (const icon of all(PARTS.icon)) if (!icon.ariaHidden) icon.ariaHidden = "true";
+    for (const icon of all(PARTS.icon)) dom.set(icon, "ariaHidden", "true");
     for (const head of all(PARTS.folderHead)) {
       head.role = "button";
       head.tabIndex = 0;
@@ -387,24 +376,20 @@ const viserPage = (() => {
   }
   watch(complete, { on: ["childList", "aria-hidden"], delay: 150 });
 
-  addEventListener("keydown", (event) => {
-    if (!["Enter", " "].includes(event.key) || !(event.target instanceof Element) || !event.target.matches(PARTS.folderHead)) return;
+  dom.on("keydown", PARTS.folderHead, (head, event) => {
+    if (!["Enter", " "].includes(event.key) || event.target !== head) return;
     event.preventDefault();
-    event.target.click();
+    head.click();
   });
   // A menu's field has the name of what is chosen, and viser's menus search for what is typed there: a click marks the
   // name, so that typing replaces it.
-  addEventListener("click", (event) => {
-    if (event.target instanceof HTMLInputElement && event.target.matches(PARTS.menu)) event.target.select();
-  });
-  addEventListener("DOMContentLoaded", () => {
-    // Arrow keys on a control must not rotate the view as well.
-    for (const kind of ["keydown", "keyup"]) {
-      document.body.addEventListener(kind, (event) => {
-        if (event.key.startsWith("Arrow") && event.target.matches("input, textarea, [role]")) event.stopPropagation();
-      });
-    }
-  });
+  dom.on("click", PARTS.menu, (field) => field.select());
+  // Arrow keys on a control must not rotate the view as well.
+  for (const kind of ["keydown", "keyup"]) {
+    document.body.addEventListener(kind, (event) => {
+      if (event.key.startsWith("Arrow") && event.target.matches("input, textarea, [role]")) event.stopPropagation();
+    });
+  }
 
   // viser leaves captured pointers to the handles of the scene, and browsers capture every touch: without this, a tap on
   // a point or a posture of the scene does nothing.
@@ -483,8 +468,6 @@ const viserPage = (() => {
     /** The tracks of sliders and the elements of ours that match a selector, in the order of the page. */
     tracksAnd: (selector) => all(`${PARTS.track}, ${selector}`),
     isTrack: (node) => node.matches(PARTS.track),
-    /** The check box with this label and its line: { box, line }, or null. */
-    checkBox,
     /** All buttons of viser's. */
     buttons: () => all(PARTS.button),
   };

@@ -16,16 +16,16 @@ export default [
     languageOptions: {
       ecmaVersion: 2023,
       sourceType: "script",
-      // static/viser_page.js, channel.js and morphdom come first in viser's page, docs.js after the library of docs.html, and three.js, the
+      // static/dom.js, viser_page.js, channel.js and morphdom come first in viser's page, docs.js after the library of docs.html, and three.js, the
       // kernels of an arm and static/takehome/numbers.js first in a saved page.
-      globals: { ...globals.browser, viserPage: "readonly", channel: "readonly", morphdom: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly", kernels: "readonly", kinboard: "readonly" },
+      globals: { ...globals.browser, dom: "readonly", viserPage: "readonly", channel: "readonly", morphdom: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly", kernels: "readonly", kinboard: "readonly" },
     },
     linterOptions: { reportUnusedDisableDirectives: "error" },
     rules: {
       eqeqeq: "error",
       "no-implicit-globals": ["error", { lexicalBindings: true }],
       "no-shadow": "error",
-      "no-unused-vars": ["error", { varsIgnorePattern: "^(viserPage|channel)$" }],
+      "no-unused-vars": ["error", { varsIgnorePattern: "^(dom|viserPage|channel)$" }],
       "no-use-before-define": ["error", { functions: false, variables: false }],
       "no-var": "error",
       "object-shorthand": "error",
@@ -42,8 +42,8 @@ export default [
   },
   { files: ALONE, rules: { "no-implicit-globals": "off" } },
   // The one constant of each is what the other scripts call.
-  ...["viserPage", "channel"].map((name) => ({
-    files: [`static/${{ viserPage: "viser_page", channel: "channel" }[name]}.js`],
+  ...["dom", "viserPage", "channel"].map((name) => ({
+    files: [`static/${{ dom: "dom", viserPage: "viser_page", channel: "channel" }[name]}.js`],
     languageOptions: { globals: { [name]: "off" } },
     rules: { "no-implicit-globals": "off" },
   })),

@@ -44,6 +44,7 @@ from app.shared.connection import (
 )
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.security import CHANNEL, UPLOAD, VIEWER_POLICY, origin_allowed
+from app.shared.settings import static_folder
 from app.shared.slots import Slot, Slots
 from kin.parsing import Limits, TextError, read_json
 
@@ -77,7 +78,7 @@ _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
 # A tab's memory, and what viser's page lacks. Relative, so that it holds behind any path prefix.
 _SCRIPTS = (
-    b"start",  # says so if one of the others fails
+    b"dom",  # the others use it
     b"viser_page",  # the others call it
     b"channel",  # the others send by it
     b"vendor/morphdom/morphdom.min",  # parts.js calls it
@@ -101,10 +102,13 @@ _SCRIPTS = (
     b"describe",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints", b"keys")
+# Scripts run when the page is read, and before that of viser, which waits for that too; the first one runs at
+# once, and says so if another one fails. Styles come after those of viser, which its script puts into the head.
 _OURS = b"".join(
-    [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in _STYLES]
-    + [b'<script src="../static/%s.js"></script>' % name for name in _SCRIPTS]
+    [b'<link rel="stylesheet" href="../static/start.css"><script src="../static/start.js"></script>']
+    + [b'<script defer src="../static/%s.js"></script>' % name for name in _SCRIPTS]
 )
+_OUR_STYLES = b"".join(b'<link rel="stylesheet" href="../static/%s.css">' % name for name in _STYLES)
 
 
 class ViewerBridge:
@@ -330,14 +334,16 @@ async def _add_slash(request: Request) -> Response:
 
 
 class _Page:
-    """viser's single-file client with a script and a style sheet of ours in front, plain and compressed."""
+    """viser's single-file client with our scripts, styles and what lies beside its parts, plain and compressed."""
 
     def __init__(self, html: bytes, link: str) -> None:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
         # A menu that opens beside a phone's screen must not widen the page.
         html = html.replace(b"initial-scale=1", b"initial-scale=1, minimum-scale=1", 1)
         # Must come before viser's own script.
-        self._html = html.replace(b"<head>", b"<head>" + _OURS + link.encode(), 1)
+        html = html.replace(b"<head>", b"<head>" + _OURS + link.encode(), 1)
+        beside = (static_folder() / "viewer.html").read_bytes()
+        self._html = html.replace(b"</body>", _OUR_STYLES + beside + b"</body>", 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {
             "content-security-policy": VIEWER_POLICY,

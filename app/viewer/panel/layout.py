@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import viser
 
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel import Post, listen
+from app.viewer.panel import Post
 from app.viewer.panel.gripper import GripperSlider
 from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
@@ -16,7 +16,6 @@ from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
-from app.viewer.panel.theme import SYSTEM_IS_DARK
 from app.viewer.views.templates import render
 from kin import Robot, fk
 from kin.units import Units
@@ -27,11 +26,10 @@ MOVE, LEARN, VIEW = "Move", "Learn", "View"  # titles of tabs
 
 
 class Panel:
-    """One visitor's panel. Posts ``"system-dark"``, and what its parts post.
+    """One visitor's panel. Posts what its parts post.
 
     Args:
         own: the visitor's own arm.
-        system_dark: whether the visitor's system is dark.
         tabs: titles of the features' tabs.
 
     Attributes:
@@ -56,13 +54,11 @@ class Panel:
         own: OwnArm | None,
         robot: Robot,
         units: Units,
-        system_dark: bool,
         welcome: Notice,
         tabs: Sequence[str],
         post: Post,
     ) -> None:
         self.status = StatusLine(gui, welcome)
-        listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
         add_html(gui, render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)

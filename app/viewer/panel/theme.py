@@ -6,7 +6,6 @@ import viser
 
 BRAND = (0, 114, 178)
 BRAND_ON_DARK = (86, 180, 233)
-SYSTEM_IS_DARK = "The system is dark"  # of a hidden check box, which static/page.js keeps as the system is
 
 
 def configure_theme(gui: viser.GuiApi, dark: bool) -> None:

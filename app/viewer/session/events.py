@@ -71,7 +71,7 @@ RULES: Final[dict[str, Rule]] = {
     "frame": Rule("Frame of the read-out", message=True),
     "gripper": Rule(step=False, act=True),
     "text-size": Rule(step=False, message=True),
-    "system-dark": Rule(step=False),
+    "system-dark": Rule(step=False, message=True),
     "body": Rule(step=False),
     "copy-as": Rule(step=False),
     "camera": Rule(step=False),

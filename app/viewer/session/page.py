@@ -350,7 +350,6 @@ class VisitorPage(Worker):
                 self.robots.own,
                 robot,
                 display.units,
-                self.system_dark,
                 self._welcome,
                 [tab.title for tab in self.offered],
                 self.post,

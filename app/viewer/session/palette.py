@@ -22,7 +22,7 @@ from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.channel.channel import Channel
 from app.viewer.session.lessons import choices
 
-# Of the page as a whole: event, words, and its key as `static/keys.js` has it.
+# Of the page as a whole: event, words, and its key as `static/viewer.html` has it.
 ACTIONS = (
     ("home", "Home configuration", ""),
     ("random", "Random configuration", ""),

@@ -8,7 +8,6 @@ import pytest
 from fake_browser import FakeBrowser
 
 from app.shared.store import Store
-from app.viewer.panel.theme import SYSTEM_IS_DARK
 from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
 
@@ -32,7 +31,7 @@ def is_dark(tab: FakeBrowser) -> bool:
 def test_the_page_follows_the_system(port: int) -> None:
     with FakeBrowser(port, memory=memory(ViewState(), dark=True)) as tab:
         assert is_dark(tab)
-        tab.set(SYSTEM_IS_DARK, False)
+        tab.say("system-dark", False)
         assert not is_dark(tab)
         assert tab.kept == [], "a link does not contain the colours of the system"
         tab.set("Page colours", "Dark")
@@ -51,6 +50,6 @@ def test_the_page_follows_the_system(port: int) -> None:
 def test_a_choice_outlasts_the_system(port: int, chosen: bool) -> None:
     with FakeBrowser(port, memory=memory(ViewState(dark=chosen), dark=not chosen)) as tab:
         assert is_dark(tab) is chosen
-        tab.set(SYSTEM_IS_DARK, chosen)
-        tab.set(SYSTEM_IS_DARK, not chosen)
+        tab.say("system-dark", chosen)
+        tab.say("system-dark", not chosen)
         assert is_dark(tab) is chosen

@@ -60,7 +60,7 @@ function load() {
     viserPage: { watch: (act) => { watchers.push(act); } },
     channel: { send: (message, argument, done = null) => { waiting.push(done); } },
   });
-  vm.runInContext(fs.readFileSync(path.join(process.argv[2], "lesson.js"), "utf8"), world, { filename: "lesson.js" });
+  for (const name of ["dom.js", "lesson.js"]) vm.runInContext(fs.readFileSync(path.join(process.argv[2], name), "utf8"), world, { filename: name });
 }
 let asked = {};
 function ask(one) {

@@ -67,16 +67,15 @@ class Storage { getItem() { return null; } setItem() {} }
 
 const page = new EventTarget();
 let changed = () => {}; // the page has
-const note = { classList: [], textContent: "", hidden: true, isConnected: true };
+const note = { textContent: "", hidden: true };
 const bar = { dataset: {}, offsetHeight: 0 };
 const root = { dataset: {}, style: { setProperty() {} }, toggleAttribute() {} };
 const document = Object.assign(new EventTarget(), {
   hidden: false,
   documentElement: root,
   body: Object.assign(new EventTarget(), { append() {} }),
-  createElement: () => note,
   querySelector: (selector) => (selector.startsWith("[data-class-bar]") ? bar
-    : selector === "[data-channel]" ? { dataset: { channel: "name" } } : selector.startsWith("canvas") ? {} : null),
+    : selector === ".kb-class-offline" ? note : selector === "[data-channel]" ? { dataset: { channel: "name" } } : selector.startsWith("canvas") ? {} : null),
   querySelectorAll: () => [],
 });
 const world = vm.createContext({
@@ -91,13 +90,12 @@ const world = vm.createContext({
   },
 });
 world.window = world;
-for (const name of ["viser_page.js", "channel.js", "class_tab.js"]) {
+for (const name of ["dom.js", "viser_page.js", "channel.js", "class_tab.js"]) {
   vm.runInContext(fs.readFileSync(path.join(process.argv[2], name), "utf8"), world, { filename: name });
 }
 Object.defineProperty(note, "textContent", { set(text) { this.text = text; log.push([now - 1e6, text]); }, get() { return this.text ?? ""; } });
 
 world.__viserMutable = { sendMessage() {} };
-page.dispatchEvent(new Event("DOMContentLoaded"));
 changed();
 const steps = {
   wait,

@@ -5,18 +5,20 @@
 //
 // A step is ["notice", name, value]: the service says this; or ["file", size, most]: a file of so many bytes is chosen.
 const fs = require("node:fs");
+const path = require("node:path");
 const vm = require("node:vm");
 
 const [sent, listeners] = [[], []];
 const [notices, kept] = [new Map(), new Map()];
 let address = "";
 const window = {};
+class Element { constructor(properties) { Object.assign(this, properties); } }
 window.top = window;
 function dispatchEvent(event) { for (const [type, act] of listeners) if (type === event.type) act(event); }
-vm.runInContext(fs.readFileSync(process.argv[2], "utf8"), vm.createContext({
-  window, dispatchEvent, CustomEvent, URLSearchParams, Element: class {},
+const page = vm.createContext({
+  window, dispatchEvent, CustomEvent, URLSearchParams, Element,
   addEventListener: (type, act) => { listeners.push([type, act]); },
-  document: { documentElement: { dataset: {}, toggleAttribute() {} }, getElementById: () => null },
+  document: { documentElement: { dataset: {}, toggleAttribute() {} }, getElementById: () => ({}) },
   location: { hash: "", search: "", pathname: "/viewer" },
   history: { state: null, replaceState: (state, title, to) => { address = to; } },
   sessionStorage: { getItem: (name) => kept.get(name) ?? null, setItem: (name, value) => { kept.set(name, value); } },
@@ -27,15 +29,18 @@ vm.runInContext(fs.readFileSync(process.argv[2], "utf8"), vm.createContext({
     on: (name, act) => { notices.set(name, act); },
     send: (name, argument) => { sent.push(argument); },
   },
-}));
+});
+for (const file of [path.join(path.dirname(process.argv[2]), "dom.js"), process.argv[2]]) vm.runInContext(fs.readFileSync(file, "utf8"), page);
 const steps = {
   notice: (name, value) => notices.get(name)(value),
-  file: (size, most) => dispatchEvent({ type: "change", target: {
-    dataset: { most: String(most) },
-    files: [{ name: "a.toml", size, text: async () => "x".repeat(size) }],
-    matches: (selector) => selector === "[data-guide-file]",
-    closest: () => ({ dataset: { feature: "course" } }),
-  } }),
+  file(size, most) {
+    const target = new Element({
+      dataset: { most: String(most) },
+      files: [{ name: "a.toml", size, text: async () => "x".repeat(size) }],
+      closest: (selector) => ({ "[data-guide-file]": target, "[data-feature]": { dataset: { feature: "course" } } })[selector],
+    });
+    dispatchEvent({ type: "change", target });
+  },
 };
 (async () => {
   for (const [step, ...rest] of JSON.parse(fs.readFileSync(0, "utf8"))) {

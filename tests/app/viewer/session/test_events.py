@@ -72,13 +72,12 @@ SENDS = (
     r'\bsend, \w+, "([\w-]+)"',  # after a time
     r'detail: \["([\w-]+)"',
     r'data-send="([\w-]+)"',
-    r"""/>', "([\w-]+)", \"""",  # buttons over the scene, after their drawings
 )
 
 
 def sent() -> set[str]:
     """The names of the messages that the page's own scripts send."""
-    paths = (*(ROOT / "static").glob("*.js"), *(VIEWER / "views").rglob("*.html"))
+    paths = (*(ROOT / "static").glob("*.js"), ROOT / "static/viewer.html", *(VIEWER / "views").rglob("*.html"))
     texts = [path.read_text(encoding="utf-8") for path in paths if path.name != "landing.js"]  # not in the viewer
     return {name for text in texts for pattern in SENDS for name in re.findall(pattern, text) if name}
 
