@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import viser
 
-from app.viewer.viser_patches import is_removed
 from kin import InputError
 
 TEXT_SIZES = {"Normal": 1.0, "Large": 1.3, "Projector": 1.7}  # as in static/layout.js and static/layout.css
@@ -51,5 +51,5 @@ def size_labels(scene: viser.SceneApi, factor: float) -> None:
     if factor != labels.factor:
         labels.factor = factor
         for (_, scale), handle in labels.handles.items():
-            if not is_removed(handle):
+            with contextlib.suppress(RuntimeError):  # it is removed
                 handle.font_screen_scale = scale * factor

@@ -37,11 +37,7 @@ from app.viewer.room.page import ClassroomPage
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
 from app.viewer.session.page import VisitorPage
-from app.viewer.viser_patches import (
-    cache_type_hints,
-    keep_sent_values,
-    log_what_viser_prints,
-)
+from app.viewer.viser_patches import cache_type_hints, log_what_viser_prints
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
 
 log = logging.getLogger(__name__)
@@ -106,7 +102,6 @@ class ViewerServer:
             raise RuntimeError("the viewer is already running")
         cache_type_hints()
         log_what_viser_prints()
-        keep_sent_values()
         server, self._connections = start_viser(loop, label="Kinboard")
         self._server = server
         configure_theme(server.gui, dark=False)
@@ -170,10 +165,10 @@ class ViewerServer:
         return len(self.pages)
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        token, ticket, welcome = self._connections.room_tokens.get(client.client_id, ""), None, READY
-        if token:
+        visitor, ticket, welcome = self._connections.visitors.get(client.client_id), None, READY
+        if visitor is not None and visitor.room_token:
             try:
-                ticket = await asyncio.to_thread(self._ticket, token)
+                ticket = await asyncio.to_thread(self._ticket, visitor.room_token)
             except ClassroomUnavailable as error:
                 welcome = Notice("error", "Your class is not available", str(error))
         self._start_page(client, welcome, RESTARTS, ticket)
@@ -187,7 +182,8 @@ class ViewerServer:
     def _start_page(
         self, client: viser.ClientHandle, welcome: Notice, restarts: int, ticket: Ticket | None
     ) -> None:
-        rights = self._connections.rights.get(client.client_id, Rights.LOOK)  # if absent, the visitor has left
+        visitor = self._connections.visitors.get(client.client_id)  # None: the visitor has left
+        rights = Rights.LOOK if visitor is None else visitor.rights
         arguments = (
             client,
             self.services,
@@ -195,11 +191,11 @@ class ViewerServer:
             LOOKING if welcome is READY and rights is Rights.LOOK else welcome,
             lambda: self._restart(client, restarts, ticket),
             rights,
-            self._connections.clients.get(client.client_id, ""),
+            "" if visitor is None else visitor.client,
         )
         page = VisitorPage(*arguments) if ticket is None else ClassroomPage(*arguments, ticket=ticket)
         with self._lock:
-            if client.client_id not in self._connections.rights:
+            if client.client_id not in self._connections.visitors:
                 return  # the visitor has left: nobody would end the page
             self.pages[client.client_id] = page
         page.start()

@@ -1,8 +1,9 @@
-"""The private names of viser that Kinboard uses, and what each is for.
+"""The private names of viser that Kinboard uses.
 
-Only :mod:`app.viewer.viser_patches`, :mod:`app.viewer.viser_outbox` and :mod:`app.viewer.viser_server` use them. A
-version of viser that lacks one of `SERVER` cannot be driven: REST works all the same, and ``/readyz`` reports that
-the viewer failed. Whatever else is missing costs an improvement, and viser's own behaviour takes its place.
+Only :mod:`app.viewer.viser_patches`, :mod:`app.viewer.viser_outbox` and :mod:`app.viewer.viser_server` use them,
+and say what for. A version of viser that lacks one of `SERVER` cannot be driven: REST works all the same, and
+``/readyz`` reports that the viewer failed. Where one of `IMPROVEMENTS` is missing, viser's own ways take the
+place of all of them.
 
 ``pyproject.toml`` allows a narrow range of versions because of `SERVER`, and because the page's scripts
 (``static/viser_page.js``) know viser's page.
@@ -14,7 +15,6 @@ from app.shared.private_names import PrivateUse
 
 _SCENE, _GUI, _MESSAGES = "viser._scene_handles", "viser._gui_handles", "viser._messages"
 _INFRA, _BUFFER = "viser.infra._infra", "viser.infra._async_message_buffer:AsyncMessageBuffer"
-_HANDLE = "viser._assignable_props_api:AssignablePropsBase._impl"
 
 SERVER = PrivateUse(
     "viser",
@@ -36,6 +36,7 @@ SERVER = PrivateUse(
         "viser.infra:WebsockServer._message_class",
         "viser.infra:WebsockServer._server_thread",
         "viser.infra:WebsockClientConnection._state",
+        f"{_MESSAGES}:GuiUpdateMessage(uuid, updates)",
         f"{_MESSAGES}:Message.deserialize(message)",
         f"{_MESSAGES}:ShareUrlRequest",
         f"{_MESSAGES}:ShareUrlDisconnect",
@@ -45,11 +46,13 @@ SERVER = PrivateUse(
         "viser:ViserServer._websock_server",
     ),
 )
-OUTBOX = PrivateUse(
+IMPROVEMENTS = PrivateUse(
     "viser",
-    "One frame and one wake-up of the event loop for all messages of a step.",
-    "viser's own buffer sends the messages: drags take about twice as long, and a connection may be lost.",
+    "One frame for each step, exact poses, values and marks in their order, parts of a scene that can be hidden.",
+    "Drags take about twice as long, Undo may pass a slider, sliders have no number fields, and what should be "
+    "hidden beside the wall of a classroom is seen.",
     (
+        # The outbox
         f"{_BUFFER}.event_loop",
         f"{_BUFFER}.message_event",
         f"{_BUFFER}.flush_event",
@@ -66,102 +69,37 @@ OUTBOX = PrivateUse(
         f"{_BUFFER}.atomic_end(self)",
         f"{_BUFFER}.flush(self)",
         f"{_INFRA}:_append_aligned_buffers",
-        f"{_MESSAGES}:SetOrientationMessage(name, wxyz, owner)",
-        f"{_MESSAGES}:SetPositionMessage(name, position, owner)",
-        f"{_MESSAGES}:GuiUpdateMessage(uuid, updates)",
         f"{_MESSAGES}:GuiRemoveMessage(uuid)",
         f"{_MESSAGES}:SceneNodeUpdateMessage(name, updates, owner)",
         "viser:ClientHandle._websock_connection",
-    ),
-)
-POSES = PrivateUse(
-    "viser",
-    "Poses exactly as computed, without viser's costly comparison with the last one, and texts of labels.",
-    "viser's own setters pose nodes: steps below 1e-5 are not shown.",
-    (
-        _HANDLE,
+        # Poses and values
+        "viser._assignable_props_api:AssignablePropsBase._impl",
         f"{_SCENE}:_SceneNodeHandleState.name",
         f"{_SCENE}:_SceneNodeHandleState.api",
-        f"{_SCENE}:_SceneNodeHandleState.props",
         f"{_SCENE}:_SceneNodeHandleState.position",
         f"{_SCENE}:_SceneNodeHandleState.wxyz",
         f"{_SCENE}:_SceneNodeHandleState.removed",
-        "viser:SceneApi._queue_scene_message(self, message)",
-        f"{_MESSAGES}:SetPositionMessage(name, position, owner)",
-        f"{_MESSAGES}:SetOrientationMessage(name, wxyz, owner)",
-        f"{_MESSAGES}:SceneNodeUpdateMessage(name, updates, owner)",
-    ),
-)
-VALUES = PrivateUse(
-    "viser",
-    "Values in the panel without a task of the event loop for each callback.",
-    "viser's own setters show values, which takes longer.",
-    (
-        _HANDLE,
         f"{_GUI}:_GuiHandleState.uuid",
         f"{_GUI}:_GuiHandleState.gui_api",
         f"{_GUI}:_GuiHandleState.value",
         f"{_GUI}:_GuiHandleState.update_timestamp",
         f"{_GUI}:_GuiHandleState.removed",
         "viser:GuiApi._websock_interface",
-        f"{_MESSAGES}:GuiUpdateMessage(uuid, updates)",
-    ),
-)
-SENT_VALUES = PrivateUse(
-    "viser",
-    "The value as a browser sent it, although another one has been shown meanwhile.",
-    "A value typed while the arm moves may be lost.",
-    ("viser:GuiApi._handle_gui_updates(self, client_id, message)", f"{_MESSAGES}:GuiUpdateMessage(uuid, updates)"),
-)
-MARKS = PrivateUse(
-    "viser",
-    "Undo, typed values and lessons take effect after the sliders that were moved before, and before later ones.",
-    "They take effect when they come: Undo may pass a slider.",
-    (
-        "viser:ClientHandle._websock_connection",
-        f"{_MESSAGES}:LocalStorageGetItemResponseMessage(value, error, request_uuid)",
-    ),
-)
-IDENTITY = PrivateUse(
-    "viser",
-    "The ids of controls, by which the page finds them, and whether a node has been removed.",
-    "Sliders have no number fields beside them, and labels on show keep their size.",
-    (_HANDLE, f"{_SCENE}:_SceneNodeHandleState.removed", f"{_GUI}:_GuiHandleState.uuid"),
-)
-FILTER = PrivateUse(
-    "viser",
-    "Hiding all nodes of a scene but some: for the wall of a classroom, and while a pose is shown alone.",
-    "What should be hidden stays in view beside the wall of a classroom and poses shown alone.",
-    (
         "viser:SceneApi._queue_scene_message(self, message)",
+        f"{_MESSAGES}:SetPositionMessage(name, position, owner)",
+        f"{_MESSAGES}:SetOrientationMessage(name, wxyz, owner)",
+        # Marks
+        f"{_MESSAGES}:LocalStorageGetItemResponseMessage(value, error, request_uuid)",
+        # Filters of scenes, and gizmos
         "viser:SceneApi._handle_from_node_name",
         f"{_MESSAGES}:SetSceneNodeVisibilityMessage(name, visible, owner)",
-    ),
-)
-GIZMOS = PrivateUse(
-    "viser",
-    "Motions of a gizmo are not repeated to other visitors, of which its scene has none.",
-    "Each event of a drag is sent back, which takes longer.",
-    (
         f"{_SCENE}:TransformControlsHandle._impl_aux",
         f"{_SCENE}:_TransformControlsState(last_updated, update_cb, sync_cb)",
+        # Type hints, and what viser prints
+        "viser._assignable_props_api:get_type_hints",
+        "viser._threadpool_exceptions:traceback",
+        "viser._threadpool_exceptions:print_awaited_callback_error(exc)",
     ),
 )
-TYPE_HINTS = PrivateUse(
-    "viser",
-    "The type hints of a class are evaluated once, not for each of its objects.",
-    "Pages open a little later.",
-    ("viser._assignable_props_api:get_type_hints",),
-)
 
-CALLBACK_ERRORS = PrivateUse(
-    "viser",
-    "Errors of callbacks in the log, where control characters are escaped.",
-    "viser prints what callbacks raise, which may contain what a visitor has sent.",
-    ("viser._threadpool_exceptions:traceback", "viser._threadpool_exceptions:print_awaited_callback_error(exc)"),
-)
-
-ALL = (
-    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, MARKS),
-    *(IDENTITY, FILTER, GIZMOS, TYPE_HINTS, CALLBACK_ERRORS),
-)
+ALL = SERVER, IMPROVEMENTS

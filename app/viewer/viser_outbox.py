@@ -6,10 +6,10 @@ flush. A generator, a timer and two tasks then wait for the next message. That c
 that is pushed within `in_one_frame` leaves in one frame and wakes the loop once. A `LoopWaker` wakes it once for
 all visitors who are waiting.
 
-It relies on private names of viser, which `app.viewer.viser_names.OUTBOX` lists; where one is missing, viser's
-buffer and its producer take its place. Tests compare the bytes with those of viser's own `_message_producer`.
-Upstream offers no way to replace its producer yet; https://github.com/viser-project/viser/issues is the place to
-ask for one.
+It relies on private names of viser, which `app.viewer.viser_names.IMPROVEMENTS` lists; where one is missing,
+viser's buffer and its producer take its place. Tests compare the bytes with those of viser's own
+`_message_producer`. Upstream offers no way to replace its producer yet;
+https://github.com/viser-project/viser/issues is the place to ask for one.
 """
 
 from __future__ import annotations
@@ -287,7 +287,7 @@ def _plain(updates: dict[str, Any]) -> bool:
 @contextlib.contextmanager
 def in_one_frame(client: viser.ClientHandle) -> Iterator[None]:
     """Send all that is pushed and flushed for a visitor within this context together, at its end."""
-    buffer = client._websock_connection.get_message_buffer() if viser_names.OUTBOX.is_there else None
+    buffer = client._websock_connection.get_message_buffer() if viser_names.IMPROVEMENTS.is_there else None
     if isinstance(buffer, Outbox):
         with buffer.waker.together(), buffer.hold():
             yield

@@ -1,28 +1,31 @@
-"""Faster and safer versions of some of viser's operations.
+"""Faster and safer versions of some of viser's operations, and what viser would have to offer in their place.
 
 :mod:`app.viewer.viser_names` lists the private names of viser that these use. Where one is missing, each function
-does the same in viser's own way, as far as there is one.
+does the same in viser's own way, as far as there is one. Tests compare them with viser's own.
 
-Poses: viser's own setters ignore poses within 1e-5 of the last one, so an arm would end near its solution and not
-on it. That comparison (`np.allclose`) takes most of their time, and a moving arm sets one pose per joint and
-frame: with thirty visitors it was a fifth of all processor time. `assign` sends the setter's message through the
-same queue.
+Poses (`assign`): viser's own setters ignore poses within 1e-5 of the last one, so an arm would end near its
+solution and not on it. That comparison (`np.allclose`) takes most of their time, and a moving arm sets one pose
+per joint and frame: with thirty visitors it was a fifth of all processor time. *viser: an exact comparison.*
 
-Values: viser's setter of an input element's value starts a task of the event loop for each callback, for each
-slider that follows the arm. `show_value` starts none. When a visitor sets a value, viser's callbacks read it from
-the element. Another thread may have shown a newer value there meanwhile, as a moving arm does, and what was typed
-was lost. `keep_sent_values` and `sent_value` have the value as it was sent.
+Values (`show_value`, `sent_value`): viser's setter of an input element's value starts a task of the event loop
+for each callback, for each slider that follows the arm. When a visitor sets a value, viser's callbacks read it
+from the element, where another thread may have shown a newer one meanwhile, as a moving arm does: what was typed
+was lost. *viser: a setter that calls nobody, and the sent value in the event.*
 
-Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
-`cache_type_hints` caches them.
+Marks (`hear_marks`): a page says which changes of controls come before its own message. *viser: messages of a
+page's own script, in order.*
 
-Parts of a scene: viser can hide one node or all of them. A `SceneFilter` hides all but some, including nodes that
-are added later. It knows which to show again.
+Parts of a scene (`SceneFilter`): viser can hide one node or all of them. A filter hides all but some, including
+nodes that are added later, and knows which to show again. *viser: a node above those of a client.*
 
-Log: viser prints what a callback raises, and warns of messages with all that is in them.
-`log_what_viser_prints` logs both.
+Gizmos (`keep_private`), ids of controls (`uuid_of`): *viser: no copies to other visitors where there are none;
+public ids.*
 
-Tests compare these functions with viser's own.
+Pages (`cache_type_hints`): viser evaluates the type hints of a class for each of its objects, a quarter of the
+cost of a page. *viser: once for each class.*
+
+Log (`log_what_viser_prints`): viser prints what a callback raises, and warns of messages with all that is in
+them. *viser: the module logging.*
 """
 
 from __future__ import annotations
@@ -41,7 +44,6 @@ from typing import Any
 import numpy as np
 import viser
 from viser import _messages as messages
-from viser.infra import ClientId
 
 from app.viewer import viser_names
 from kin.transforms import Array
@@ -62,7 +64,7 @@ def assign(
     Raises:
         RuntimeError: the node has been removed.
     """
-    if not viser_names.POSES.is_there:
+    if not viser_names.IMPROVEMENTS.is_there:
         if position is not None:
             node.position = np.asarray(position)
         if wxyz is not None:
@@ -89,7 +91,7 @@ def show_value(handle: Any, value: object, again: bool = False) -> None:
     Raises:
         RuntimeError: the element has been removed.
     """
-    if not viser_names.VALUES.is_there:
+    if not viser_names.IMPROVEMENTS.is_there:
         handle.value = value
         return
     state = handle._impl
@@ -104,56 +106,23 @@ def show_value(handle: Any, value: object, again: bool = False) -> None:
 
 MARK = "kinboard-mark"  # in the place of a question's id
 _DIGITS = 16  # of a mark, at most
-_SENT = contextvars.ContextVar[dict[str, Any] | None]("sent", default=None)
+_HEARD = contextvars.ContextVar[Any]("heard", default=None)  # the message of a browser that is handled
 
 
-def keep_sent_values() -> None:
-    """Let callbacks ask for the value that a browser has sent, with `sent_value`. It may be called again."""
-    if not viser_names.SENT_VALUES.is_there:
-        return
-    original = viser.GuiApi._handle_gui_updates
-    if getattr(original, "keeps_sent_values", False):
-        return
-
-    @functools.wraps(original)
-    async def handle(self: Any, client_id: ClientId, message: Any) -> None:
-        before = _SENT.set(message.updates)
-        try:
-            await original(self, client_id, message)
-        finally:
-            _SENT.reset(before)
-
-    handle.keeps_sent_values = True  # type: ignore[attr-defined]
-    viser.GuiApi._handle_gui_updates = handle  # type: ignore[method-assign]
+def note_heard(message: object) -> None:
+    """Have callbacks know the message for which they are called."""
+    _HEARD.set(message)
 
 
 def sent_value(event: Any) -> Any:
     """The value that a browser has sent, in a callback of an input element; of the type of its values."""
-    shown, sent = event.target.value, _SENT.get()
-    if sent is None or "value" not in sent:
+    shown, message = event.target.value, _HEARD.get()
+    if not isinstance(message, messages.GuiUpdateMessage) or "value" not in message.updates:
         return shown
-    value = sent["value"]
+    value = message.updates["value"]
     if isinstance(shown, tuple):
         return tuple(map(type(shown[0]), value)) if shown else tuple(value)
     return type(shown)(value)
-
-
-def show_text(label: viser.LabelHandle, text: str) -> None:
-    """Show another text in a label; an unchanged one is not sent.
-
-    Raises:
-        RuntimeError: the label has been removed.
-    """
-    if not viser_names.POSES.is_there:
-        label.text = text
-        return
-    state = label._impl
-    if state.removed:
-        raise RuntimeError(f"{state.name} was removed and cannot be written")
-    props: Any = state.props
-    if text != props.text:
-        props.text = text
-        state.api._queue_scene_message(messages.SceneNodeUpdateMessage(state.name, {"text": text}))
 
 
 def hear_marks(client: viser.ClientHandle, act: Callable[[int], Coroutine[Any, Any, None]]) -> None:
@@ -163,7 +132,7 @@ def hear_marks(client: viser.ClientHandle, act: Callable[[int], Coroutine[Any, A
 
     A mark is an answer to nobody's question about the browser's storage, which viser ignores.
     """
-    if not viser_names.MARKS.is_there:
+    if not viser_names.IMPROVEMENTS.is_there:
         return
 
     async def hear(_: int, message: messages.LocalStorageGetItemResponseMessage) -> None:
@@ -172,11 +141,6 @@ def hear_marks(client: viser.ClientHandle, act: Callable[[int], Coroutine[Any, A
             await act(int(text))
 
     client._websock_connection.register_handler(messages.LocalStorageGetItemResponseMessage, hear)
-
-
-def is_removed(node: viser.SceneNodeHandle) -> bool:
-    """Whether a node is no longer in the scene, so that its properties cannot be set; True: perhaps."""
-    return not viser_names.IDENTITY.is_there or bool(node._impl.removed)
 
 
 class SceneFilter:
@@ -192,7 +156,7 @@ class SceneFilter:
     def __init__(self, scene: viser.SceneApi, kept: str) -> None:
         self._scene = typing.cast(Any, scene)
         self._kept = kept
-        self._open = not viser_names.FILTER.is_there
+        self._open = not viser_names.IMPROVEMENTS.is_there
         if self._open:
             return
         self._send = self._scene._queue_scene_message
@@ -231,12 +195,15 @@ _LIGHTS = viser.AmbientLightHandle, viser.DirectionalLightHandle, viser.Hemisphe
 
 def uuid_of(handle: Any) -> str:
     """The id of a control: of its message, and of its element in the page; empty where that is not known."""
-    return str(handle._impl.uuid) if viser_names.IDENTITY.is_there else ""
+    return str(handle._impl.uuid) if viser_names.IMPROVEMENTS.is_there else ""
 
 
 def keep_private(gizmo: viser.TransformControlsHandle) -> None:
-    """Stop viser from copying a gizmo's motion to other visitors: a visitor's own scene has no others."""
-    if viser_names.GIZMOS.is_there:
+    """Stop viser from copying a gizmo's motion to other visitors: a visitor's own scene has no others.
+
+    The copies would also take the place of poses that wait for the visitor.
+    """
+    if viser_names.IMPROVEMENTS.is_there:
         gizmo._impl_aux.sync_cb = None
 
 
@@ -260,7 +227,7 @@ def log_what_viser_prints() -> None:
     for name, module in list(sys.modules.items()):
         if name.partition(".")[0] == "viser" and vars(module).get("warnings") is warnings:
             vars(module)["warnings"] = SimpleNamespace(warn=warn)
-    if viser_names.CALLBACK_ERRORS.is_there:
+    if viser_names.IMPROVEMENTS.is_there:
         from viser import _threadpool_exceptions as printing
 
         vars(printing).update(print=lambda *_, **__: None, traceback=SimpleNamespace(print_exception=log_error))
@@ -268,7 +235,7 @@ def log_what_viser_prints() -> None:
 
 def cache_type_hints() -> None:
     """Make viser evaluate the type hints of each class once."""
-    if viser_names.TYPE_HINTS.is_there:
+    if viser_names.IMPROVEMENTS.is_there:
         from viser import _assignable_props_api as props
 
         props.get_type_hints = functools.cache(typing.get_type_hints)  # type: ignore[attr-defined, assignment]

@@ -31,9 +31,9 @@ from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection, ConnectionEnded
-from app.shared.security import Rights
 from app.viewer import viser_names
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
+from app.viewer.viser_patches import note_heard
 
 log = logging.getLogger(__name__)
 
@@ -56,9 +56,7 @@ class PortlessServer(infra.WebsockServer):
         self._background_event_loop = loop
         self._loop = loop
         self._ids = itertools.count()
-        self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
-        self.clients: dict[int, str] = {}  # their names in limits per client, by client id
-        self.room_tokens: dict[int, str] = {}  # of classrooms, not verified, by client id
+        self.visitors: dict[int, Connection] = {}  # who are connected, by client id
         self._open = 0  # connections
         self.waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
@@ -105,8 +103,7 @@ class PortlessServer(infra.WebsockServer):
         buffer, sends = self._outgoing(number, visitor)
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
-        self.rights[number], self.clients[number] = connection.rights, connection.client
-        self.room_tokens[number] = connection.room_token
+        self.visitors[number] = connection
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
@@ -126,9 +123,7 @@ class PortlessServer(infra.WebsockServer):
             await asyncio.gather(*flows, return_exceptions=True)
             buffer.set_done()
             self._client_state_from_id.pop(number, None)
-            self.rights.pop(number, None)
-            self.clients.pop(number, None)
-            self.room_tokens.pop(number, None)
+            self.visitors.pop(number, None)
             self._broadcast_buffer.generator_cursors.pop(number, None)
             await _call(self._client_disconnect_cb, client)
 
@@ -136,7 +131,7 @@ class PortlessServer(infra.WebsockServer):
         self, number: infra.ClientId, visitor: Any
     ) -> tuple[AsyncMessageBuffer, Callable[[], Coroutine[Any, Any, None]]]:
         """The buffer of a visitor's messages, and what sends them until the connection ends."""
-        if viser_names.OUTBOX.is_there:
+        if viser_names.IMPROVEMENTS.is_there:
             outbox = Outbox(number, self.waker, self._packer)
             return outbox, functools.partial(outbox.send_to, visitor)
         buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
@@ -163,6 +158,7 @@ class PortlessServer(infra.WebsockServer):
         No handler waits for a later message of this connection: callbacks that may wait run in threads, or post to
         the inbox.
         """
+        note_heard(message)
         try:
             await handler._handle_incoming_message(number, message)
         except Exception as error:  # noqa: BLE001 - fields are converted without checks

@@ -105,7 +105,7 @@ class VisitorPage(Worker):
         self.display = Display(self._frames_changed)
         self.view, self.system_dark = ViewState(), False
         self.links = Links(token, encode_features)
-        self.channel = Channel(self.post, rights, viser_names.MARKS.is_there)
+        self.channel = Channel(self.post, rights, viser_names.IMPROVEMENTS.is_there)
         hear_marks(client, self.channel.mark)
         self.fence = Fence(client, lambda: self.post(FENCE))
         client.gui.add_html(render("panel/channel", name=self.channel.name))
