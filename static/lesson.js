@@ -101,14 +101,16 @@
 
   addEventListener("kinboard-connect", () => { filled = new WeakMap(); });
 
-  // Focus: where its control is taken away, the question or the block gets it.
-  let focus = null; // selector of the block, and key of the question
+  // Focus: kept when its control comes in another block; where the control is gone, the question or the block gets it.
+  const NAMES = ["data-guide-do", "data-guide-field", "data-question-key", "data-argument", "data-cell", "data-guide-change"];
+  let focus = null; // selectors of the block and the control, and key of the question
   let gone = false; // the visitor has moved the focus away
   addEventListener("focusin", ({ target }) => {
     const node = dom.closest(target, ".kb-guide :is([data-guide-do], [data-guide-field], [data-cell], [data-guide-change])");
     gone = false;
     focus = node && {
       block: `[data-guide="${node.closest(".kb-guide").dataset.guide}"]`,
+      control: NAMES.filter((name) => node.hasAttribute(name)).map((name) => `[${name}="${node.getAttribute(name)}"]`).join(""),
       question: node.closest("[data-question]")?.dataset.question,
     };
   });
@@ -120,7 +122,8 @@
   function restore() {
     if (!focus || gone || document.activeElement !== document.body) return;
     const block = document.querySelector(focus.block);
-    const node = block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
+    const node = block?.querySelector(focus.control) ?? document.querySelector(`.kb-guide ${focus.control}`)
+      ?? block?.querySelector(`[data-question="${focus.question}"] [data-guide-do]`)
       ?? (block?.dataset.feature && block.querySelector(".kb-question :is(button, input)"))
       ?? block?.querySelector(".kb-guide-turn button:last-child") ?? block?.querySelector("[data-first]");
     node?.focus({ preventScroll: true });
