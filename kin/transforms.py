@@ -19,6 +19,7 @@ from kin.tolerances import TOLERANCES
 
 Array = NDArray[np.float64]
 _FLOAT = np.dtype(np.float64)
+_UNMOVED = np.eye(4)
 _THREE = (float, float, float)
 
 
@@ -103,7 +104,7 @@ def as_transform(value: ArrayLike, field: str = "target") -> Array:
 
 def pose_from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Array:
     """`kin.pose_from_position_wxyz` for a quaternion of any length but zero; raises `InputError`."""
-    T = np.eye(4)
+    T = _UNMOVED.copy()
     p = finite_array("position", position, (3,))
     if p.ndim != 1:
         raise InputError("position", f"shape {p.shape}", "three numbers x, y, z in metres")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Final
 
@@ -32,6 +32,17 @@ def _options(
     return IKOptions(
         task=task, constraints=constraints, branch=branch, avoid_self_collision=avoid, obstacles=obstacles
     )
+
+
+# What is computed, from which fields.
+_COMPUTED = {
+    "T_tool": frozenset({"q"}),
+    "T_goal": frozenset({"goal"}),
+    "goal_points": frozenset({"goal"}),
+    "aim": frozenset({"goal", "target"}),
+    "options": frozenset({"goal", "task", "branch", "locks", "obstacles", "avoid"}),
+    "contacts_at": frozenset({"obstacles", "avoid"}),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +109,20 @@ class Arm:
         links = self.avoid or bool(self.robot.capsules)
         return surroundings(self.robot, self.obstacles, links).touches if links or self.obstacles else _nothing
 
+    def changes(self, before: Arm | None) -> frozenset[str]:
+        """The names of what may have another value: fields of other objects, and what is computed from them."""
+        if before is None or before.robot is not self.robot:
+            return _ALL
+        own = {name for name in _FIELDS if getattr(self, name) is not getattr(before, name)}
+        return frozenset(own | {name for name, of in _COMPUTED.items() if not of.isdisjoint(own)} | {"at"})
+
     def at(self, q: Array) -> Arm:
         """The same arm at another configuration ``(n,)``."""
         return replace(self, q=q)
+
+
+_FIELDS = tuple(field.name for field in fields(Arm))
+_ALL = frozenset({*_FIELDS, *_COMPUTED, "at", "changes"})
 
 
 def _nothing(q: Array) -> tuple[Contact, ...]:

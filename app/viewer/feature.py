@@ -9,7 +9,7 @@ and what it sends appears together with the arm's new pose.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import ClassVar, Protocol
 
@@ -134,8 +134,8 @@ class Feature:
     def on_robot(self) -> None:
         """Another robot was selected. Not called for the robot that is there when the feature is constructed."""
 
-    def on_arm_changed(self) -> None:
-        """``stage.arm.now`` is another one: called once at the end of a step, however much has changed in it."""
+    def on_arm_changed(self, changed: Set[str]) -> None:
+        """``stage.arm.now`` is another one, in what is named (`Arm.changes`): once, at the end of a step."""
 
     def on_result(self, result: IKResult) -> None:
         """Inverse kinematics was solved for a target."""

@@ -126,7 +126,7 @@ class BarePage:
         if notice is not None:
             self.notices.append(notice)
         if self.feature is not None:
-            self.feature.on_arm_changed()
+            self.feature.on_arm_changed(self.now.changes(None))
 
     def set_target(self, T: Array) -> None:
         self.targets.append(T)
@@ -181,7 +181,7 @@ class BarePage:
         for share in np.linspace(0.0, 1.0, count + 1)[1:]:
             self.use(robot, robot.q_home + share * np.array([0.3, -0.2, 0.25, 0.1, 0.2, 0.3, 0.1])[: robot.n])
             before = len(self.sent)
-            lesson.on_arm_changed()
+            lesson.on_arm_changed(self.now.changes(None))
             assert len(self.sent) == before, "a frame alone takes none"
             self.rest()
         return len(self.sent) / count
@@ -190,7 +190,7 @@ class BarePage:
         """Move the arm."""
         assert self.feature is not None
         self.use(self.now.robot, q, **more)
-        self.feature.on_arm_changed()
+        self.feature.on_arm_changed(self.now.changes(None))
         self.rest()
 
     def restore(self, state: dict[str, object]) -> None:

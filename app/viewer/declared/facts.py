@@ -7,6 +7,7 @@ facts last as long as what they have read: those that never ask for `q` are not 
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, Self, TypeVar
 
@@ -30,6 +31,10 @@ class ArmReads:
     def __getattr__(self, name: str) -> Any:
         value = self._read[name] = getattr(self._arm, name)
         return value
+
+    def untouched(self, changed: Set[str]) -> bool:
+        """Whether nothing of these names was read; see `Arm.changes`."""
+        return self._read.keys().isdisjoint(changed)
 
     def follow(self, arm: Arm) -> bool:
         """Stand for another arm if all values read so far are the same there; returns whether they are."""

@@ -17,7 +17,7 @@ viser::
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any, ClassVar, Generic, ParamSpec, TypeVar, cast
 
@@ -318,10 +318,11 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._begin()
         self.for_parts(lambda part: part.on_robot())
 
-    def on_arm_changed(self) -> None:
-        self.catch_up()
+    def on_arm_changed(self, changed: Set[str]) -> None:
+        if not self._reads.untouched(changed):
+            self.catch_up()
         for part in self._parts.values():
-            part.on_arm_changed()
+            part.on_arm_changed(changed)
 
     def on_style(self) -> None:
         self._begin()

@@ -7,7 +7,7 @@ from typing import Literal
 import viser
 
 from app.viewer.labels import add_label
-from app.viewer.viser_patches import assign
+from app.viewer.viser_patches import assign, show_text
 from kin.transforms import Array
 
 Anchor = Literal["bottom-center", "top-center"]
@@ -46,7 +46,7 @@ class KeyNumber:
     def show(self, text: str, point: Array, radius: float) -> None:
         """Write beside a point ``(3,)``, for an arm in a sphere of this radius (m); "" hides the text."""
         if text:
-            self._label.text = text
+            show_text(self._label, text)
             x, y, z = point.tolist()
             assign(self._label, (x, y, z + self._height * radius))
         if self._label.visible != bool(text):

@@ -177,9 +177,10 @@ class VisitorPage(Worker):
 
     def _tell(self) -> None:
         """Tell every feature that the arm is another one, if it is."""
-        if self.arm.now is not self._heard_of:
-            self._heard_of = self.arm.now
-            self.for_features(lambda feature: feature.on_arm_changed())
+        now, before = self.arm.now, self._heard_of
+        if now is not before:
+            self._heard_of, changed = now, now.changes(before)
+            self.for_features(lambda feature: feature.on_arm_changed(changed))
 
     # Reports of the page's parts
 
@@ -297,7 +298,7 @@ class VisitorPage(Worker):
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
                 self.status.fail(next((feature.failure for feature in self.features if feature.failure), ""))
                 self.status.offer("".join(feature.offer for feature in self.features))
-                if batch:
+                if batch and not self.arm.dragging:
                     self._renew_palette()
             if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
                 self._save()  # in the same frame, so that nothing is on show that a reload would lose

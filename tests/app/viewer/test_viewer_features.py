@@ -64,7 +64,7 @@ class Witness(Feature):
     def on_robot(self):
         self.note("robot", self.stage.arm.now.robot.id)
 
-    def on_arm_changed(self):
+    def on_arm_changed(self, changed):
         self.note("arm", *self.stage.arm.now.q)
 
     def on_result(self, result):

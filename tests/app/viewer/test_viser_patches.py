@@ -21,6 +21,7 @@ from app.viewer.viser_patches import (
     keep_private,
     note_heard,
     sent_value,
+    show_text,
     show_value,
 )
 
@@ -138,6 +139,22 @@ def test_a_value_is_sent_as_the_setter_sends_it_and_no_callback_is_called(wire, 
     with pytest.raises(RuntimeError, match="GuiTextHandle was removed"):
         show_value(handle, "c")
     assert called == []
+
+
+def test_text_of_a_label_is_sent_as_by_its_setter_and_once(wire):
+    messages, scene = wire
+    shown = []
+    for show in (lambda handle, text: setattr(handle, "text", text), show_text):
+        label = scene.add_label("/label", "old")
+        messages.clear()
+        show(label, "Δ 1 mm")
+        show(label, "Δ 1 mm")
+        (message,) = messages
+        shown.append((message, label.text))
+    assert shown[0] == shown[1]
+    label.remove()
+    with pytest.raises(RuntimeError, match="/label was removed"):
+        show_text(label, "late")
 
 
 def test_hints_are_looked_up_once_and_are_the_same(wire, monkeypatch):

@@ -6,7 +6,7 @@ drawn beside them, and shows it again at the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -121,11 +121,11 @@ class WorkedExample(DeclaredFeature[ExampleSettings, Facts[ExampleSettings]]):
         behind = step.way[: max(1, round(share * (len(step.way) - 1)) + 1)]
         return showing.drawing.nodes(step.at(share), step.drawn, behind, walk, self.stage.display.units)
 
-    def on_arm_changed(self) -> None:
+    def on_arm_changed(self, changed: Set[str]) -> None:
         showing = self.settings.showing
         if showing is not None and not np.array_equal(showing.left, self.stage.arm.now.goal):
             self.close()  # who moves the own arm wants to see it
-        super().on_arm_changed()
+        super().on_arm_changed(changed)
 
     def on_style(self) -> None:
         text, showing = self._text(), self.settings.showing

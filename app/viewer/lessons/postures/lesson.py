@@ -13,7 +13,7 @@ The list is updated at most ten times a second; remedies are searched only when 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from typing import ClassVar
 
 import kin
@@ -177,13 +177,13 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         now = self.stage.arm.now
         self.change(drive=loop.driven(now.robot, None, now.q) if self.settings.round else None)
 
-    def on_arm_changed(self) -> None:
+    def on_arm_changed(self, changed: Set[str]) -> None:
         if self.settings.round and not self._outdated:
             before = self.settings.drive
             drive = loop.driven(self.stage.arm.now.robot, before, self.stage.arm.now.q)
             if drive is not before:
                 self.change(drive=drive)
-        super().on_arm_changed()
+        super().on_arm_changed(changed)
 
     def on_steps(self, progress: Progress) -> Outline | None:
         at, steps = progress.at, progress.outline.steps

@@ -6,7 +6,7 @@ the folder `capability`. Points come from the service's cache of clouds; what el
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence, Set
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -194,9 +194,9 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         self._clouds.show_legend()
         super().on_style()
 
-    def on_arm_changed(self) -> None:
+    def on_arm_changed(self, changed: Set[str]) -> None:
         self._window.arm_moved()
-        super().on_arm_changed()
+        super().on_arm_changed(changed)
 
     def tick(self, now: float) -> None:
         self._clouds.advance(now)

@@ -462,10 +462,10 @@ def test_a_frame_sends_only_what_moved_and_renders_nothing_twice(page: BarePage)
     rendered, frames = toy.rendered, toy.frames
     page.watch()
     page.now = replace(page.now, q=page.now.robot.random_q(rng))
-    toy.on_arm_changed()
+    toy.on_arm_changed(page.now.changes(None))
     assert sorted(page.sent) == ["SceneNodeUpdateMessage", "SetPositionMessage"]
     assert (toy.rendered, toy.frames) == (rendered, frames)
-    toy.on_arm_changed()
+    toy.on_arm_changed(page.now.changes(None))
     assert len(page.sent) == 2, "nothing has changed"
     page.rest()
     assert toy.rendered == rendered + 1

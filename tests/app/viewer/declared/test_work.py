@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from threading import Event
 from typing import Any
 
@@ -17,12 +17,12 @@ from app.viewer.arm import Arm
 from app.viewer.declared.facts import ArmReads, Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings, memory
-from app.viewer.declared.panel import Html, Node
+from app.viewer.declared.panel import Html, Node, same
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.scene import frame
 from app.viewer.declared.work import Runner, Sweep, Work, in_background
 from app.viewer.feature import Feature
-from kin import InputError
+from kin import InputError, Obstacle
 
 UR5 = STORE.get("ur5")
 
@@ -253,6 +253,33 @@ def test_an_arm_follows_another_one_as_long_as_all_that_was_read_is_the_same() -
     assert not of_goal.follow(Arm(UR5, other, other))
 
 
+NAMES = sorted({field.name for field in fields(Arm)} | {n for n in vars(Arm) if not n.startswith("_")})
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(Arm)])
+def test_every_value_that_differs_when_one_field_of_an_arm_does_is_named(name: str) -> None:
+    q = UR5.q_home
+    others: dict[str, Any] = {
+        "robot": STORE.get("puma560"),
+        "q": q + 0.1,
+        "goal": q + 0.1,
+        "target": np.eye(4),
+        "task": "position",
+        "branch": "seed",
+        "locks": (True,) * 6,
+        "obstacles": (Obstacle("table", (0.6, 0.0, 0.4), size=(0.8, 0.6, 0.1)),),
+        "avoid": True,
+    }
+    first = Arm(UR5, q, q, locks=(False,) * 6)
+    second = replace(first, **{name: others[name]})
+    differ = {each for each in NAMES if not same((getattr(first, each),), (getattr(second, each),))}
+    assert name in differ
+    assert second.changes(first) >= differ - {"changes"}
+    reads = ArmReads(first)
+    assert reads.task == "pose"
+    assert reads.untouched(second.changes(first)) == (name not in ("task", "robot"))
+
+
 @dataclass(frozen=True)
 class Nothing(Settings):
     ticks: int = memory(0)
@@ -292,13 +319,13 @@ def test_a_panel_and_a_scene_that_do_not_read_the_configuration_are_not_made_aga
         made = still.panels, still.scenes
         for k in range(1, 4):
             page.now = replace(page.now, q=UR5.q_home + 0.1 * k)
-            still.on_arm_changed()
+            still.on_arm_changed(page.now.changes(None))
             page.rest()
         assert (still.panels, still.scenes) == made
         assert still.read.q is page.now.q, "facts are those of the arm on show"
         for k in range(1, 4):
             page.now = replace(page.now, goal=UR5.q_home + 0.1 * k)
-            still.on_arm_changed()
+            still.on_arm_changed(page.now.changes(None))
             page.rest()
         assert still.panels == made[0] + 3
 

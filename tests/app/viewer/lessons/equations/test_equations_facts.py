@@ -99,6 +99,6 @@ def test_new_numbers_take_no_more_messages_than_before(name: str) -> None:
         page.watch()
         for share in np.linspace(0.0, 1.0, count + 1)[1:]:
             page.use(robot, robot.q_home + share * np.array([0.3, -0.2, 0.25, 0.1, 0.2, 0.3])[: robot.n])
-            lesson.on_arm_changed()
+            lesson.on_arm_changed(page.now.changes(None))
             page.rest()
         assert 0.5 <= len(page.sent) / count <= FRAMES[name]

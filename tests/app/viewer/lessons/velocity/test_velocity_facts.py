@@ -135,6 +135,6 @@ def test_a_frame_takes_no_more_messages_than_before(case: str) -> None:
         page.watch()
         for share in np.linspace(0.0, 1.0, count + 1)[1:]:
             page.use(robot, robot.q_home + share * np.array([0.3, -0.2, 0.25, 0.1, 0.2, 0.3]))
-            lesson.on_arm_changed()
+            lesson.on_arm_changed(page.now.changes(None))
         assert len(page.sent) / count <= FRAMES[case]
         assert len(page.sent) > 0.9 * count
