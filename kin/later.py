@@ -32,11 +32,6 @@ class Later(Sequence[T]):
             self._compute = None  # after the elements are there for other threads
         return self._found
 
-    @property
-    def is_computed(self) -> bool:
-        """Whether the elements are known."""
-        return self._compute is None
-
     def __bool__(self) -> bool:
         """True, without computing anything: there is at least one element."""
         return True

@@ -13,13 +13,6 @@ Flags = NDArray[np.bool_]
 Edge = tuple[int, int, int]  # i, j, and 0 for the edge to (i + 1, j), 1 for the one to (i, j + 1)
 
 
-def crossings(inside: Flags) -> list[Edge]:
-    """The edges of a grid ``(a, b)`` of which one end is inside."""
-    along = np.argwhere(inside[1:] != inside[:-1])
-    across = np.argwhere(inside[:, 1:] != inside[:, :-1])
-    return [(int(i), int(j), 0) for i, j in along] + [(int(i), int(j), 1) for i, j in across]
-
-
 def ends(edge: Edge, inside: Flags) -> tuple[tuple[int, int], tuple[int, int]]:
     """The end of an edge that is inside, and the one that is not."""
     i, j, way = edge
