@@ -14,6 +14,7 @@ Function = Callable[..., float]
 
 LONGEST = 400  # characters
 MOST_POWER = 8.0
+LARGEST = 1e12  # of the values of expressions: the squares of what is made of them are still numbers
 CONSTANTS = {"pi": math.pi, "deg": math.pi / 180.0, "mm": 1e-3, "cm": 1e-2}
 FUNCTIONS: dict[str, Function] = {
     "abs": abs,
@@ -109,8 +110,9 @@ class Expression:
             raise ExpressionError(f"unknown name {error.args[0]}", self.field) from None
         except (ArithmeticError, ValueError, TypeError, IndexError, RecursionError) as error:
             raise ExpressionError(f"{self.text}: {error}", self.field) from None
-        if not math.isfinite(found):
-            raise ExpressionError(f"{self.text} is not finite", self.field)
+        if not abs(found) <= LARGEST:
+            expected = f"a number from {-LARGEST:g} to {LARGEST:g}"
+            raise ExpressionError(f"{self.text}: got {found:g}, expected {expected}", self.field)
         return found
 
 

@@ -110,6 +110,8 @@ method = "Add them up."
         ("answer.value", "hypot(", "answer.value[0]", "an expression"),
         ("answer.value", "nobody + 1", "answer.value[0]", "a name from"),
         ("answer.value", "__import__('os')", "answer.value[0]", "an expression"),
+        ("answer.value", "1e300", "answer.value[0]", "from -1e+12 to 1e+12"),
+        ("answer.value", "1e999", "answer.value[0]", "from -1e+12 to 1e+12"),
         ("answer.tolerance", "-1", "answer.tolerance", "above 0"),
     ],
 )
@@ -118,6 +120,16 @@ def test_a_refusal_names_field_value_and_what_is_valid(path: str, text: str, fie
     assert found.exercise is None
     assert found.field == field
     assert words in found.error
+
+
+@pytest.mark.parametrize("path", ["answer.motions[1].by", "vary[1].choose"])
+def test_numbers_of_motions_are_bounded(path: str) -> None:
+    draft = tomllib.loads(next(path for path in FILES if path.stem == "dh-order").read_text())
+    assert trial(with_cell(draft, path, "1e12")).error == "", "the largest one can be computed with"
+    found = trial(with_cell(draft, path, "1e160"))
+    assert found.field == "answer.motions[1].by"
+    assert "expected a number from -1e+12 to 1e+12" in found.error
+    found.students(UNITS)
 
 
 def test_an_id_that_is_taken_is_refused_and_what_cannot_be_solved_is_said() -> None:
