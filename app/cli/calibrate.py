@@ -14,7 +14,16 @@ import numpy as np
 
 from app.cli.pipes.sink import write_output
 from app.cli.pipes.source import opened_source
-from app.cli.terminal import Notation, mounted_robot_of, pose_of, print_json, quantity, table, units_of
+from app.cli.terminal import (
+    Notation,
+    mounted_robot_of,
+    pose_of,
+    print_json,
+    quantity,
+    report_beside,
+    table,
+    units_of,
+)
 from app.exports.touch import as_own, report, sheet_svg
 from app.shared.answers.calibration import CalibrationAnswer, TouchPlanAnswer
 from kin import InputError, Robot, robot_to_toml
@@ -64,11 +73,21 @@ def run(arguments: Namespace) -> int:
     try:
         if given is None or arguments.plan is not None:
             done = None if given is None else (given.q, given.sockets)
-            return _print_plan(robot, _proposed(robot, fixture, done, tolerances, noise, arguments), arguments)
+            plan = _proposed(robot, fixture, done, tolerances, noise, arguments)
+            if arguments.output is not None:
+                write_output(arguments.output, _postures(robot, plan))
+            with report_beside(arguments.output, arguments.print):
+                return _print_plan(robot, plan, arguments)
         found = calibrate(robot, given.q, given.sockets, fixture, tolerances=tolerances, noise=noise)
     except InputError as error:
         raise _as_typed(error, given, fixture) from None
-    return _print_fit(found, given.sockets, arguments)
+    found = replace(found, robot=as_own(found.robot))
+    if arguments.output is not None:
+        write_output(arguments.output, robot_to_toml(found.robot))
+    if arguments.html is not None:
+        write_output(arguments.html, report(found, given.sockets.astype(int).tolist()), "--html")
+    with report_beside(arguments.output, arguments.print, arguments.html):
+        return _print_fit(found, arguments)
 
 
 def _proposed(
@@ -152,14 +171,17 @@ def _as_typed(error: InputError, given: Read | None, fixture: TouchFixture) -> I
     return InputError(f"{given.places[k]}, socket", float(given.sockets[k]) + 1.0, valid)
 
 
-def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
-    """Print or write the postures of a plan."""
+def _postures(robot: Robot, plan: TouchPlan) -> str:
+    """The postures of a plan as a table (CSV)."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_columns(robot))
     rows.writerows([socket + 1, *q] for socket, q in zip(plan.sockets.tolist(), plan.q.tolist(), strict=True))
-    if arguments.output is not None:
-        write_output(arguments.output, text.getvalue())
+    return text.getvalue()
+
+
+def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
+    """Print a plan."""
     if arguments.json:
         return print_json(TouchPlanAnswer.of(plan))
     notation = Notation(robot, arguments.rad)
@@ -180,13 +202,8 @@ def _print_plan(robot: Robot, plan: TouchPlan, arguments: Namespace) -> int:
     return 0
 
 
-def _print_fit(found: Calibration, sockets: Array, arguments: Namespace) -> int:
-    """Print what was found, and write the arm and the report."""
-    found = replace(found, robot=as_own(found.robot))
-    if arguments.output is not None:
-        write_output(arguments.output, robot_to_toml(found.robot))
-    if arguments.html is not None:
-        write_output(arguments.html, report(found, sockets.astype(int).tolist()), "--html")
+def _print_fit(found: Calibration, arguments: Namespace) -> int:
+    """Print what was found."""
     if arguments.json:
         print_json(CalibrationAnswer.of(found))
     else:

@@ -14,7 +14,7 @@ import kin
 from app.cli.bodies import MeshesBeside, MeshFilesBeside
 from app.cli.classroom.courses import check_course
 from app.cli.pipes.sink import write_output
-from app.cli.terminal import Notation, print_json, robot_of, table
+from app.cli.terminal import Notation, print_json, report_beside, robot_of, table
 from app.cli.xacro import expanded, is_xacro
 from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
 from app.exercises.exercise import CHECKED_SEEDS
@@ -39,6 +39,12 @@ def run_import(arguments: Namespace) -> int:
     text = robot_to_toml(found.robot)
     if arguments.output is not None:
         write_output(arguments.output, text)
+    with report_beside(arguments.output):
+        return _print_import(found, text, arguments)
+
+
+def _print_import(found: UrdfRobot, text: str, arguments: Namespace) -> int:
+    """Print the robot file, or about the one that was written."""
     if arguments.json:
         return print_json(import_answer(found))
     if arguments.output is None:
@@ -239,10 +245,11 @@ def run_doctor(arguments: Namespace) -> int:
         found = examined(_chosen(found, arguments.mend))
     if arguments.output is not None and found.mended is not None:
         write_output(arguments.output, found.mended)
-    if arguments.json:
-        print_json(examination_answer(found))
-    else:
-        print("\n".join(_examination_lines(found, arguments.output)))
+    with report_beside(arguments.output):
+        if arguments.json:
+            print_json(examination_answer(found))
+        else:
+            print("\n".join(_examination_lines(found, arguments.output)))
     return 1 if found.count("wrong") or found.count("suspicious") else 0
 
 

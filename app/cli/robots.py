@@ -18,6 +18,7 @@ from app.cli.terminal import (
     named_robot,
     print_json,
     quantity,
+    report_beside,
     robot_of,
     store_of,
     table,
@@ -117,10 +118,11 @@ def run_motors(arguments: Namespace) -> int:
     found = match_motors(robot, given or motor_poses(robot)[: len(readings)], readings)
     if arguments.output is not None:
         write_output(arguments.output, robot_to_toml(replace(robot, motors=found.motors)))
-    if arguments.json:
-        print_json(MotorMatchAnswer.of(found))
-    else:
-        print("\n".join(finding.text for finding in found.findings))
+    with report_beside(arguments.output):
+        if arguments.json:
+            print_json(MotorMatchAnswer.of(found))
+        else:
+            print("\n".join(finding.text for finding in found.findings))
     return 0 if found.complete else 1
 
 

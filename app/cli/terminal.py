@@ -10,6 +10,8 @@ import os
 import sys
 import tomllib
 from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +150,13 @@ def text_of(path: str, field: str) -> str:
         return sys.stdin.read() if path == "-" else Path(path).read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
         raise InputError(field, path, f"a readable text file ({error})") from None
+
+
+@contextmanager
+def report_beside(*outputs: str | None) -> Iterator[None]:
+    """What is printed in it goes to standard error if one of the files is "-": standard output has that alone."""
+    with redirect_stdout(sys.stderr if "-" in outputs else sys.stdout):
+        yield
 
 
 def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +35,18 @@ def test_a_plan_is_printed_and_written(touches: Path, capsys) -> None:
     more = json.loads(capsys.readouterr().out)
     assert len(more["q"]) == 3
     assert more["expected"]["after"] < more["expected"]["before"]
+
+
+def test_standard_output_has_the_file_alone(touches: Path, capfdbinary) -> None:
+    words = ["--bar", "150", "-o", "-"]
+    assert main(["calibrate", "ur5e", "--plan", "10", *words]) == 0
+    out, err = capfdbinary.readouterr()
+    assert out == touches.read_bytes()
+    assert b"board 1  at about" in err
+    assert main(["calibrate", "ur5e", str(touches), *words]) == 0
+    out, err = capfdbinary.readouterr()
+    assert kin.robot_from_dict(tomllib.loads(out.decode())).nominal is not None
+    assert b"touch  off by" in err
 
 
 def test_a_fit_is_printed_and_written(touches: Path, tmp_path: Path, capsys) -> None:

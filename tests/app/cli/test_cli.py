@@ -627,6 +627,8 @@ def test_import_prints_or_writes_a_robot_file(capsys, tmp_path):
     assert code == 0
     assert kin.load_robot(file).rows == robot.rows
     assert "links       panda_link0 to panda_link8" in out.splitlines()
+    words = ("import", panda, "--tip", "panda_link8", "--base", "panda_link0", "-o", "-")
+    assert run(capsys, *words)[1] == file.read_text(), "the report is on standard error"
     assert "units       m and rad in the file; commands read mm and deg, with --rad m and rad" in out.splitlines()
     got = answer(capsys, "import", panda, "--tip", "panda_link8")
     assert got["report"]["difference"] <= 1e-12

@@ -57,6 +57,8 @@ def test_findings_have_lines_and_the_mended_file_is_written(sick: Path, tmp_path
     assert found["mended"] == mended.read_text()
     assert {each["rank"] for each in found["findings"]} == {"wrong", "suspicious", "left out"}
     assert found["moved"] == 0.0
+    assert main(["doctor", str(sick), "--tip", "tool0", "-o", "-"]) == 1
+    assert capsys.readouterr().out == found["mended"], "the report is on standard error"
     assert main(["doctor", str(mended), "--tip", "tool0"]) == 1  # meshes are looked for from where it is now
 
 
