@@ -110,13 +110,13 @@ def add_motors(parser: ArgumentParser) -> None:
 
 def add_calibrate(parser: ArgumentParser) -> None:
     """The table of your own arm, from touches of a pin, a bar or a printed sheet."""
-    parser.add_argument(
+    touches = parser.add_argument(
         "touches",
-        nargs="?",
         metavar="TOUCHES",
         help="what the joints read: a table (CSV or Parquet) with the columns socket (from 1; 0: the plane), q1, "
         "q2, … in radians (metres), or these numbers alone; -: standard input. Without it, postures are proposed",
     )
+    touches.required = False  # with nargs="?", argparse would take no file where options stand before it
     board = parser.add_mutually_exclusive_group(required=True)
     board.add_argument("--pin", action="store_true", help="one socket, or the point of a pin")
     board.add_argument("--bar", metavar="LENGTH", help="two sockets at this distance, millimetres (--rad: metres)")

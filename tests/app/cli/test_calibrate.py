@@ -43,7 +43,7 @@ def test_standard_output_has_the_file_alone(touches: Path, capfdbinary) -> None:
     out, err = capfdbinary.readouterr()
     assert out == touches.read_bytes()
     assert b"board 1  at about" in err
-    assert main(["calibrate", "ur5e", str(touches), *words]) == 0
+    assert main(["calibrate", "ur5e", *words, str(touches)]) == 0
     out, err = capfdbinary.readouterr()
     assert kin.robot_from_dict(tomllib.loads(out.decode())).nominal is not None
     assert b"touch  off by" in err
