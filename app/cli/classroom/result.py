@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
 import sys
 from argparse import Namespace
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from app.classroom import ClassroomUnavailable, Hub
@@ -15,6 +15,7 @@ from app.classroom.results.store import pages_of, sent_to
 from app.classroom.results.table import csv_of
 from app.classroom.tokens import read_code
 from app.classroom.work import Attempt
+from app.cli.pipes.sink import opened_output
 from app.cli.terminal import print_json
 from app.exercises import Exercises
 from app.shared.settings import Settings
@@ -56,7 +57,7 @@ def run_results(arguments: Namespace) -> int:
         find, own = Store(settings.robots).get, sent_to(hub.database, room.id).own
         titles = SentExercises(Exercises(settings.exercises, find), own, find).titles
         pages = pages_of(hub.database, room.id)
-        if arguments.output is None:
+        if arguments.output in (None, "-"):
             for text in csv_of(pages, titles):
                 print(text, end="")
         else:
@@ -78,11 +79,9 @@ def _write(path: str, pages: Iterable[Sequence[Attempt]], titles: Mapping[str, s
             count += len(page)
             yield page
 
-    try:
-        with Path(path).open("w", encoding="utf-8-sig", newline="") as file:  # spreadsheets know the letters then
-            file.writelines(csv_of(counted(), titles))
-    except OSError as error:
-        raise InputError("--output", path, f"a file that can be written ({error.strerror})") from None
+    with opened_output(path) as file:
+        file.write(codecs.BOM_UTF8)  # spreadsheets know the letters then
+        file.writelines(text.encode() for text in csv_of(counted(), titles))
     return count
 
 

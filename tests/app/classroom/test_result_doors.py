@@ -89,7 +89,10 @@ def test_a_rooms_attempts_become_csv(
     attempts = attempts_of(hub.database, room.id)
     assert [(one.alias, one.score) for one in attempts] == [("Ada", 0.0), ("=HYPERLINK(1)", 0.5), ("Ada", 1.0)]
     assert main(["results", room.code]) == 0
-    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    printed = capsys.readouterr().out
+    assert main(["results", room.code, "-o", "-"]) == 0
+    assert capsys.readouterr().out == printed
+    rows = list(csv.DictReader(io.StringIO(printed)))
     assert [(row["alias"], row["attempt"]) for row in rows] == [
         ("Ada", "1"),
         ("'=HYPERLINK(1)", "1"),
