@@ -249,15 +249,15 @@ class Conversation:
                 return
             now = self._loop.time()
             replies = self._line.replies()
+            for pressed in (reply.pressed for reply in replies if reply.pressed):
+                await self._send({"type": "pressed", "button": pressed})  # before news: it may stop who follows
             if now < next_news and not replies:
                 self._loop.call_later(next_news - now, self._woken.set)
             elif values := self._line.news(self._known):  # before `done`: what was done has been heard then
                 next_news = now + self._interval
                 self._known.update({name: number for name, (number, _) in values.items()})
                 await self._send(news({name: value for name, (_, value) in values.items()}))
-            for reply in replies:
-                pressed = {"type": "pressed", "button": reply.pressed}
-                self._own.append(pressed if reply.pressed else _letter(reply.number, reply.problem))
+            self._own += [_letter(reply.number, reply.problem) for reply in replies if not reply.pressed]
             while self._own:
                 await self._send(self._own.popleft())
 

@@ -58,6 +58,7 @@ class TapeSettings(Settings):
         announced: what it says of itself and offers, and a number of its own.
         said: what it has said of itself last.
         program: its name; "": none is connected.
+        halted: why the page had it stop; "" once it drives again.
     """
 
     at: float = slider("Time (s)", 0.0, (0.0, LONGEST), hint=AT_HINT, digits=2, step=0.01, link=False)
@@ -67,6 +68,7 @@ class TapeSettings(Settings):
     announced: tuple[int, Announcement] | None = memory(renew=False)
     said: Announcement | None = memory(renew=False)
     program: str = memory("", renew=False)
+    halted: str = memory("", renew=False)
 
 
 class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
@@ -96,7 +98,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         """Take what the program says, draws and measures; raises `kin.InputError`."""
         self.schedule()
         if "drives" in values and self.settings.driven != (values["drives"] or ""):
-            self.change(driven=values["drives"] or "")
+            self.change(driven=values["drives"] or "", halted="" if values["drives"] else self.settings.halted)
             self._tape.stop()
         if "announce" in values:
             said = values["announce"]
@@ -120,6 +122,26 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         stop = None if found is None else found[1].stop
         self.stage.channel.show("driven", driven)
         self.stage.channel.show("stop", ["", ""] if stop is None or not driven else [stop.name, stop.label])
+
+    def halt(self, why: str) -> bool:
+        """Have a program that drives something stop, as *Stop* does: not the visitor moves the page's arm now.
+
+        A recording that is played stops, too. Returns whether there is such a program. Its connection ends where
+        it offers nothing that stops it.
+        """
+        self._tape.stop()
+        line = self.stage.door.line
+        said = None if line is None else line.announced
+        stop = None if said is None else said.stop
+        enabled = stop is not None and said is not None and said.state == "enabled"
+        if line is None or not (self.settings.driven or enabled):
+            return False
+        self.schedule()
+        if stop is not None and line.press(stop.name):
+            self.change(halted=why)
+        else:
+            self.on_close()
+        return True
 
     def _press(self, event: str, name: str, number: object) -> None:
         """Pass a press on to the program; raises `InputError` for one that no button of ours sends.
@@ -226,7 +248,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         program, found = self.settings.program, self.settings.announced
         if not program:
             return ""
-        return views.stop(program) if found is None else views.announced(program, *found)
+        return views.stop(program) if found is None else views.announced(program, *found, self.settings.halted)
 
     # Declared
 
@@ -245,7 +267,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     def _meet(self, name: str) -> None:
         """Say who has connected or left."""
         before = self.settings.program
-        self.change(program=name)
+        self.change(program=name, halted=self.settings.halted if name == before else "")
         if name and name != before:
             self.stage.status.show(Notice("hand", f"{name} is connected", "It may move the arm. Tab Program."))
         elif before and not name and self.stage.door.line is not None:
@@ -392,6 +414,6 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         """Withdraw the code, and remove what the program has drawn."""
         self.stage.door.close()
         self._tape.end(STOPPED)
-        self.change(drawings=None, measured=None, program="", driven="", announced=None)
+        self.change(drawings=None, measured=None, program="", driven="", announced=None, halted="")
         self._show_driven()
         self.stage.status.show(Notice("hand", "The code is withdrawn", "No program can move this page with it."))

@@ -74,11 +74,22 @@ STATES: dict[State, tuple[str, str, str]] = {
 
 
 @lru_cache(maxsize=256)
-def announced(name: str, number: int, said: Announcement) -> str:
-    """What a program announces, for the status card; presses tell the `number`: they count for this one."""
+def announced(name: str, number: int, said: Announcement, halted: str = "") -> str:
+    """What a program announces, for the status card; presses tell the `number`: they count for this one.
+
+    Args:
+        halted: why the page had it stop, before its own words.
+    """
     state, symbol, color = STATES[said.state]
     return render(
-        "live/announced", name=name, number=number, announced=said, state=state, symbol=symbol, color=color
+        "live/announced",
+        name=name,
+        number=number,
+        announced=said,
+        halted=halted,
+        state=state,
+        symbol=symbol,
+        color=color,
     )
 
 

@@ -88,6 +88,7 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
     acts = False
     settings_of, facts_of = MemberSettings, Facts
     pace = 0.2
+    led_why = "the class follows its teacher"  # why a real arm is stopped when another page begins to lead
 
     def __init__(self, stage: Stage) -> None:
         self.page = cast(MemberPage, stage)
@@ -108,6 +109,15 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
     def leader(self) -> str:
         """Who leads this page: "teacher", or the id of a seat."""
         return self.settings.leader
+
+    @property
+    def driven(self) -> str:
+        """What a connected program drives with this page; empty: nothing."""
+        return "" if (connect := self._connect) is None else connect.settings.driven
+
+    @property
+    def _connect(self) -> Connect | None:
+        return next((each for each in self.page.features if isinstance(each, Connect)), None)
 
     # To be overridden
 
@@ -222,13 +232,17 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
 
     def follow(self, leader: str, text: str, title: str = "", before: PageState | None = None) -> None:
         """Show the state of another page from now on, or again; with a title, undo leads back to `before`."""
+        stopped: Notice | None = None
         if leader != self.leader:
+            stopped = self.stop_driven(self.led_why)
             if not self.leader and title and before is not None:
                 self.page.record(title, before)
             self.change(leader=leader)
             self.page.set_following(True)
             self.follower.begin()
         self.follower.show(text)
+        if stopped is not None:
+            self.page.status.show(stopped)  # what is shown has had words of its own
 
     def free(self) -> None:
         """Nobody leads this page any more."""
@@ -236,6 +250,25 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
             self.change(leader="")
             self.follower.moving = False
             self.page.set_following(False)
+
+    def stop_driven(self, why: str) -> Notice | None:
+        """Stop the real arm that a program drives, before another hand than its owner's moves the page's arm.
+
+        Returns what was said of it; None: there is none.
+        """
+        driven, connect = self.driven, self._connect
+        if connect is None or not connect.halt(f"Stopped: {why}."):
+            return None
+        notice = Notice("error", f"Stopped: {why}", f"{driven or 'Its program'} moves by your own hand only.")
+        self.page.status.show(notice)
+        return notice
+
+    def on_driven(self) -> None:
+        """A program has begun to drive something: an act of this page, which ends a lead or is refused."""
+        if self.leader and (why := self.refusal("live")):
+            if (notice := self.stop_driven(self.led_why)) is None:
+                return
+            self.page.status.show(replace(notice, detail=why))
 
     def twice(self, what: Hashable) -> bool:
         """Whether a button that needs two presses was pressed for the second time."""

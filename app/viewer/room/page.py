@@ -45,7 +45,10 @@ class ClassroomPage(MemberPage):
 
     def _act(self, key: Hashable, value: object) -> None:
         if self._member is None or self._member.allows(key, value):
+            driven = self._member is None or self._member.driven
             super()._act(key, value)
+            if self._member is not None and self._member.driven and not driven:
+                self._member.on_driven()
         elif key == "live":
             self.live.refuse(self._member.refusal("live"))
 

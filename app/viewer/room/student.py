@@ -144,6 +144,7 @@ class Student(Member):
             return
         self.free()
         self._gone = True
+        self.stop_driven("your teacher has sent a task")
         self._open_task()
         self.page.status.show(Notice("hand", "A task from your teacher", exercise.title))
 
@@ -163,6 +164,7 @@ class Student(Member):
         if not paused or (gone and self.activity.lesson is not None):
             return
         before = self._arm
+        self.stop_driven("nobody leads the class now, and your exercise is open again")
         self.page.lessons.open(paused)
         if self._arm != before:
             self.follower.drop_obstacles()
@@ -189,6 +191,7 @@ class Student(Member):
             return
         self.free()
         self._gone = True
+        self.stop_driven("your teacher has sent a course")
         lessons.open(lessons.courses.key)
         self._open_tab += 1
         over = "" if replaced is None else f". The task “{replaced.title}” is over; your answers stay stored."

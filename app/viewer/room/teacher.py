@@ -36,6 +36,7 @@ CHOICES = ("Elbow up", "Elbow down")
 class Teacher(Member):
     """The teacher's page."""
 
+    led_why = "this page shows a student’s arm"
     messages = frozenset(
         {
             *("follow", "freeze", "fields", "untask", "uncourse", "close", "unask", "look", "return", "show"),

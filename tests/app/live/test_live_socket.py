@@ -20,6 +20,7 @@ import kin
 from app.api import ComputeSlots, api_routes
 from app.classroom.tokens import show_code
 from app.live import VALUES, Line, Lines, Listener, codes
+from app.live.announced import Announcement, Button
 from app.live.recording import Recording
 from app.service.web.rooms.limits import Limits
 from app.shared.problems import problem
@@ -501,3 +502,17 @@ def test_delay_and_rate_are_measured(page, port):
         wait_for(lambda: page.line.program.delay() is not None, 10.0)
         assert page.line.program.rate() == 0
         assert 0.0 < (page.line.program.delay() or 0.0) < 1.0
+
+
+def test_a_press_is_heard_before_the_news_that_waits(page, port):
+    """It may stop what follows the news."""
+    with call(port, page.line.code) as program:
+        say(program, subscribe={"values": ["q"], "rate": 1}, id=1)
+        heard(program, "done")
+        page.line.send({"announce": Announcement("It follows.", "enabled", (Button("stop", "Stop", stops=True),))})
+        page.line.publish("q", np.zeros(6))
+        heard(program, "news")
+        page.line.publish("q", np.ones(6))  # within the second in which no more news is sent
+        time.sleep(0.1)
+        assert page.line.press("stop")
+        assert [json.loads(program.recv(timeout=5.0))["type"] for _ in range(2)] == ["pressed", "news"]

@@ -84,6 +84,20 @@ def room(rooms_served: tuple[int, Hub]) -> Iterator[Class]:
     found.hub.rooms.end(found.room.id)
 
 
+@pytest.fixture
+def lines(monkeypatch: pytest.MonkeyPatch) -> list[Line]:
+    """The lines of the pages of the test, in the order in which they were opened."""
+    lines: list[Line] = []
+    open_line = Lines.open
+
+    def opened(self: Lines, *arguments: Any) -> Line:
+        lines.append(open_line(self, *arguments))
+        return lines[-1]
+
+    monkeypatch.setattr(Lines, "open", opened)
+    return lines
+
+
 def press(browser: FakeBrowser, *key: str, value: object = None) -> None:
     """Press a control of the tab Class, as static/lesson.js does."""
     browser.say("feature", ["class", [*key, len(browser.log)], value])
@@ -674,16 +688,7 @@ def test_the_wall_says_what_the_list_says(room: Class) -> None:
 
 
 @pytest.mark.full
-def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
-    lines: list[Line] = []
-    open_line = Lines.open
-
-    def opened(self: Lines, *arguments: Any) -> Line:
-        lines.append(open_line(self, *arguments))
-        return lines[-1]
-
-    monkeypatch.setattr(Lines, "open", opened)
-
+def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, lines: list[Line]) -> None:
     def names() -> list[str]:
         return [node["props"]["text"] for name, node in sorted(teacher.nodes.items()) if "/name/" in name]
 
@@ -707,16 +712,8 @@ def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, monkeyp
 
 @pytest.mark.full
 def test_a_member_who_may_not_act_presses_nothing_of_a_program_but_what_stops_it(
-    room: Class, monkeypatch: pytest.MonkeyPatch
+    room: Class, lines: list[Line]
 ) -> None:
-    lines: list[Line] = []
-    open_line = Lines.open
-
-    def opened(self: Lines, *arguments: Any) -> Line:
-        lines.append(open_line(self, *arguments))
-        return lines[-1]
-
-    monkeypatch.setattr(Lines, "open", opened)
     buttons = Button("weigh", "Weigh"), Button("enable", "Enable", "It moves."), Button("stop", "Stop", stops=True)
 
     def heard(*presses: str) -> list[str]:
@@ -748,6 +745,112 @@ def test_a_member_who_may_not_act_presses_nothing_of_a_program_but_what_stops_it
     assert "Press Stop following first." in student.html
     assert bar(student) == "led", "the lead goes on"
     assert 'data-announced="' not in teacher.html, "the buttons are those of the page that is connected"
+
+
+STOP = Button("stop", "Stop", stops=True)
+
+
+def drive(browser: FakeBrowser, lines: list[Line], *buttons: Button) -> Line:
+    """A program drives an arm with this page, and has announced so if it has buttons."""
+    browser.set("Connect a program", True)
+    browser.wait(lambda: "data-live-code" in browser.html)
+    line = lines[-1]
+    line.connect(Program("arm.py", "1", lambda: None))
+    line.send({"drives": "SO-101"})
+    if buttons:
+        line.send({"announce": Announcement("It follows.", "enabled", buttons)})
+    browser.wait(lambda: browser.shown.get("driven") == "SO-101")
+    browser.settle()
+    return line
+
+
+def pressed(line: Line) -> list[str]:
+    """The buttons that the program has heard of since."""
+    return [reply.pressed for reply in line.replies() if reply.pressed]
+
+
+@pytest.mark.full
+def test_a_real_arm_is_stopped_before_the_page_follows_the_teacher(room: Class, lines: list[Line]) -> None:
+    teacher, (student, _) = room.teacher(), room.join("Ann")
+    line = drive(student, lines, STOP)
+    moved_first: list[bool] = []
+    publish = line.publish
+
+    def published(name: str, value: Any, anew: bool = True) -> None:
+        if name == "q" and value[0] != ROBOT.q_home[0]:
+            moved_first.append(not line._replies)
+        publish(name, value, anew)
+
+    line.publish = published  # type: ignore[method-assign]
+    teacher.set("1 rotating base", 30.0)
+    press(teacher, "follow")
+    mode(student, "led")
+    student.wait(lambda: "Stopped: the class follows its teacher." in student.html)
+    student.wait(lambda: bool(moved_first))
+    assert moved_first[0] is False, "the press is sent before the first joint of the teacher"
+    assert pressed(line) == ["stop"]
+    line.send({"drives": None, "announce": Announcement("It holds its place.", "stopped", (STOP,))})
+    student.wait(lambda: "Stopped: the class follows its teacher. <bdi>It holds its place." in student.html)
+    teacher.set("1 rotating base", 40.0)
+    student.settle()
+    assert pressed(line) == [], "once"
+    press(teacher, "follow")
+    mode(student, "free")
+    line.send({"drives": "SO-101", "announce": Announcement("It follows.", "enabled", (STOP,))})
+    student.wait(lambda: 'data-announced="enabled"' in student.html)
+    assert "Stopped: the class follows" not in student.html
+    assert pressed(line) == []
+
+
+@pytest.mark.full
+def test_a_program_that_offers_no_stop_is_disconnected_when_the_page_is_led(
+    room: Class, lines: list[Line]
+) -> None:
+    teacher, (student, _) = room.teacher(), room.join("Ann")
+    line = drive(student, lines)
+    press(teacher, "follow")
+    student.wait(lambda: line.ended != "")
+    student.wait(lambda: student.shown.get("driven") == "")
+    student.wait(lambda: "Stopped: the class follows its teacher" in student.html)
+
+
+@pytest.mark.full
+def test_a_task_of_the_teacher_stops_a_real_arm(room: Class, lines: list[Line]) -> None:
+    teacher, (student, _) = room.teacher(), room.join("Ann")
+    line = drive(student, lines, STOP)
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    student.wait(lambda: "Stopped: your teacher has sent a task." in student.html)
+    assert pressed(line) == ["stop"]
+
+
+@pytest.mark.full
+def test_the_teachers_own_arm_is_stopped_before_a_students_is_shown(room: Class, lines: list[Line]) -> None:
+    teacher, (student, ticket) = room.teacher(), room.join("Ann")
+    line = drive(teacher, lines, STOP)
+    student.set("1 rotating base", 30.0)
+    student.settle()
+    press(teacher, "look", ticket.seat)
+    teacher.wait(lambda: "Stopped: this page shows a student’s arm." in teacher.html)
+    assert pressed(line) == ["stop"]
+
+
+@pytest.mark.full
+def test_what_begins_to_be_driven_ends_a_lead_or_is_stopped_in_a_frozen_class(
+    room: Class, lines: list[Line]
+) -> None:
+    teacher, student, _, _ = lead(room)
+    line = drive(student, lines, STOP)
+    mode(student, "gone")
+    assert pressed(line) == []
+    line.send({"drives": None, "announce": Announcement("It holds its place.", "stopped", (STOP,))})
+    student.wait(lambda: student.shown["driven"] == "")
+    press(teacher, "freeze")
+    student.wait(lambda: "data-class-frozen" in student.html)
+    mode(student, "led")
+    line.send({"drives": "SO-101"})
+    student.wait(lambda: "Stopped: the class follows its teacher." in student.html)
+    assert pressed(line) == ["stop"]
 
 
 @pytest.mark.full
