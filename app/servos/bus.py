@@ -11,7 +11,7 @@ import scservo_sdk
 from numpy.typing import NDArray
 
 import kin
-from app.servos.ports import BusError, is_simulated, port_problem
+from app.servos.ports import BusError, PortGoneError, is_simulated, port_problem
 from app.servos.registers import BAUD, GOAL, HOTTEST, PRESENT, TORQUE, TURN, VOLTAGE
 from app.servos.simulated import SimulatedPort, simulated_arm
 
@@ -74,7 +74,7 @@ class Bus:
                 result = scservo_sdk.COMM_RX_CORRUPT
                 continue
             except GONE as gone:
-                raise BusError(f"the bus at {self.port} is gone: {gone}") from None
+                raise PortGoneError(f"the bus at {self.port} is gone: {gone}") from None
             finally:
                 self._handler.is_using = False
             if result == scservo_sdk.COMM_SUCCESS:
@@ -189,15 +189,22 @@ class Bus:
             if group.txPacket() != scservo_sdk.COMM_SUCCESS:
                 raise BusError(f"the bus at {self.port} took no goals")
         except GONE as gone:
-            raise BusError(f"the bus at {self.port} is gone: {gone}") from None
+            raise PortGoneError(f"the bus at {self.port} is gone: {gone}") from None
         finally:
             self._handler.is_using = False
 
     def switch(self, motors: Motors, on: bool) -> None:
-        """Switch the torque of servos."""
-        write = self._packets.write1ByteTxRx
+        """Switch the torque of servos; off: of all that answer, before it raises for those that do not."""
+        write, lost = self._packets.write1ByteTxRx, []
         for motor in motors:
-            self._ask(motor, lambda: (None, *write(self._handler, motor.id, TORQUE, int(on))))  # noqa: B023
+            try:
+                self._ask(motor, lambda: (None, *write(self._handler, motor.id, TORQUE, int(on))), not on)  # noqa: B023
+            except BusError as error:
+                if on or isinstance(error, PortGoneError):
+                    raise
+                lost.append(str(error))
+        if lost:
+            raise BusError("; ".join(lost))
 
     def close(self) -> None:
         """Close the port; the servos stay as they are."""

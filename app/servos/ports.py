@@ -22,6 +22,10 @@ class BusError(kin.KinematicsError):
     """A servo does not answer, or the port is gone."""
 
 
+class PortGoneError(BusError):
+    """The port is gone, and all servos with it."""
+
+
 def described(ports: Iterable[Any]) -> str:
     """Ports and what they are, one a line."""
     return "\n".join(f"  {port.device}: {port.description}" for port in ports)

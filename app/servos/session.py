@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import kin
 from app.servos.bus import Bus
 from app.servos.calibration import gripper_of, moving
-from app.servos.ports import BusError
+from app.servos.ports import BusError, PortGoneError
 from app.servos.scale import Scale
 from kin.notebook.driving import Guide, PageLostError
 
@@ -183,12 +183,15 @@ class Session:
                 raise
             word, state, words = "stop", "stopped", f"{error}."
             print(words, file=sys.stderr, flush=True)
-            if _is_gone(error):
+            if isinstance(error, PortGoneError):
                 self._announce("fault", words)
                 raise
         if word != "quit":
             self._page.drives = None
-            self._announce(*(("ready", OFF) if word == "release" else (state, words)))
+            if word == "release" and self._enabled:
+                self._release_or_refuse(word)  # once more: not all were reached, which the page is to say
+            else:
+                self._announce(*(("ready", OFF) if word == "release" else (state, words)))
         return word
 
     @property
@@ -219,10 +222,10 @@ class Session:
             try:
                 self._release_or_refuse(word)
                 self._show()
+            except PortGoneError as error:
+                self._announce("fault", f"{error}.")
+                raise
             except BusError as error:
-                if _is_gone(error):
-                    self._announce("fault", f"{error}.")
-                    raise
                 if str(error) != lost:
                     lost = str(error)
                     self._say("fault", f"{lost}. The ghost is hidden meanwhile.")
@@ -240,14 +243,27 @@ class Session:
         self._announce(state, words)
 
     def _release(self) -> None:
-        self._bus.switch(self._all, False)
+        """Switch the motors off; raises `BusError` for those that cannot be reached, when the others are off."""
+        try:
+            self._bus.switch(self._all, False)
+        except PortGoneError:
+            raise
+        except BusError as error:
+            raise BusError(f"{error}. The other motors are off") from None
+        self._enabled = False
         print(OFF, flush=True)
 
     def _release_or_refuse(self, word: str) -> None:
         """Do what may be asked of an arm that does not follow."""
         if word == "release":
-            self._release()
-            self._announce("ready", OFF)
+            try:
+                self._release()
+            except PortGoneError:
+                raise
+            except BusError as error:
+                self._say("fault", f"{error}.")
+            else:
+                self._announce("ready", OFF)
         elif word.startswith("gripper"):
             print("The gripper moves after enable only.", flush=True)
         elif word and word != "stop":
@@ -371,12 +387,10 @@ class Session:
                 return
             lost = self._bus.hold(on)
         except BusError as error:
+            if release:
+                print(f"{error}.", file=sys.stderr)
+                return
             lost = [str(error)]
         for why in lost:
             print(f"{why}. It goes on to its last goal, which is close by.", file=sys.stderr)
         print("The arm holds its place: its motors stay on until its power is off.", flush=True)
-
-
-def _is_gone(error: Exception) -> bool:
-    """Whether the port of the bus is lost."""
-    return isinstance(error, BusError) and "is gone" in str(error)

@@ -507,6 +507,50 @@ def test_a_servo_that_is_lost_meanwhile_is_a_fault_in_the_page_until_it_answers(
     assert rig.line.written == []
 
 
+def test_a_released_arm_whose_servo_was_lost_is_ready_again_and_not_stopped(rig):
+    def move(t: float) -> None:
+        if round(t / session.CYCLE) == 25:
+            rig.typed.put("release")
+        rig.line.missing = {4} if 1.0 < t < 2.0 else set()
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"])
+    assert [state for state, *_ in rig.page.announced] == ["ready", "enabled", "ready", "fault", "ready"]
+    assert not any(rig.torque)
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_release_switches_off_all_that_answer_and_says_which_does_not(rig, follows):
+    """A servo that reports an error is switched off, too."""
+
+    def move(t: float) -> None:
+        step = round(t / session.CYCLE)
+        if not follows and step == 15:
+            rig.typed.put("stop")
+        if step == 25:
+            rig.typed.put("release")
+            rig.line.missing, rig.line.servos[5].error = {2}, 1 << 5
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"])
+    assert rig.torque == [False, True, False, False, False]
+    said = "motor 2 (shoulder_lift) does not answer. The other motors are off."
+    assert said in [words for _, words, _ in rig.page.announced]
+    assert session.OFF not in [words for _, words, _ in rig.page.announced]
+
+
+def test_quit_ends_although_not_all_motors_can_be_released(rig):
+    def move(t: float) -> None:
+        if round(t / session.CYCLE) == 25:
+            rig.typed.put("quit")
+            rig.line.missing = {2}
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"], seconds=60.0, release=True)
+    assert rig.torque == [False, True, False, False, False]
+    assert rig.clock.now < 105.0
+
+
 def test_a_fault_holds_the_arm_even_where_the_end_would_release_it(rig):
     rig.line.servos[1].stuck = True
 
