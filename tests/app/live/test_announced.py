@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from fake_browser import FakeBrowser
-from live_code import code_of
+from live_code import code_of, fail_network
 from live_server import wait_for
 
 import kin
@@ -110,7 +110,7 @@ def test_what_stops_a_driven_arm_is_in_the_frame_of_the_page(page, program):
 
 def test_what_was_announced_comes_back_with_the_connection_and_leaves_with_the_program(page, program):
     number = announce(page, program, "It rests: joint 2 is held.", [WEIGH], state="stopped")
-    program.arm._connection._socket.socket.shutdown(2)  # the network fails
+    fail_network(program.arm)
     page.wait(lambda: f'data-argument="{number}"' not in page.html and 'data-announced="stopped"' in page.html)
     program.arm.close()
     page.wait(lambda: "data-announced=" not in page.html)

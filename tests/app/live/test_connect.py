@@ -14,7 +14,7 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_code import code_of
+from live_code import code_of, fail_network
 from live_server import wait_for
 
 import kin
@@ -76,7 +76,7 @@ def test_what_is_driven_is_shown_as_long_as_the_program_is_there(viewer, page, c
         arm.drives = None
         page.wait(lambda: page.shown.get("driven") == "")
         arm.drives = "SO-101"
-        arm._connection._socket.socket.shutdown(2)  # the network fails
+        fail_network(arm)
         page.wait(lambda: page.shown.get("driven") == "")
         page.wait(lambda: page.shown.get("driven") == "SO-101")
         with pytest.raises(RefusedError, match="drives"):
@@ -217,7 +217,7 @@ def test_a_lost_connection_comes_back_with_what_was_drawn(page, arm):
     arm.measured = Q
     page.wait(lambda: len(drawn(page)) == 1)
     events = arm.events()
-    arm._connection._socket.socket.close()  # as a network does that fails
+    fail_network(arm)
     until(events, "disconnected", lambda _: True)
     until(events, "connected", lambda _: True)
     page.wait(lambda: len(drawn(page)) == 1 and "data-live-measured" in page.html)
