@@ -478,6 +478,8 @@ def test_a_phone_that_is_turned_keeps_tab_and_history(phone: Tab) -> None:
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_timeout(300)
         expect(page.get_by_role("tab", name="Learn")).to_have_attribute("aria-selected", "true")
+        # The lines below tabs, in two rows if need be, are below each row and not through it.
+        expect(page.get_by_role("tablist")).to_have_css("background-size", "100% 44px")
         assert history is not None
         expect(page.locator("[data-send=undo]")).to_have_attribute("title", history)
     phone.open("Move")
