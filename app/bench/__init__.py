@@ -10,7 +10,7 @@ import os
 from argparse import Namespace
 
 
-def run(arguments: Namespace) -> int:
+def run_bench(arguments: Namespace) -> int:
     """``kinboard bench``; see `app.bench.command.bench`."""
     for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):  # read at import: every library uses one thread
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")

@@ -215,7 +215,7 @@ COMMANDS = (
     Command("result", classroom.add_result, ".classroom.result:run_result"),
     Command("results", classroom.add_results, ".classroom.result:run_results"),
     Command("lti", classroom.add_lti, ".classroom.lti:run"),
-    Command("bench", service.add_bench, "..bench:run"),
+    Command("bench", service.add_bench, "..bench:run_bench"),
     Command("check", arms.add_check, ".files:run_check", "robots output"),
     Command("compare", arms.add_compare, ".robots:run_compare", "robots output"),
     Command("motors", arms.add_motors, ".robots:run_motors", "arm robots output"),

@@ -254,7 +254,7 @@ def test_a_visitor_who_leaves_while_the_page_restarts_leaves_no_page_behind(monk
             monkeypatch.setattr(viser.GuiApi, "reset", slow)
             tab.set("1 rotating base", 10.0)
             assert restarts.wait(10)
-        wait_for(lambda: not viewer._connections.rights)
+        wait_for(lambda: not viewer._connections.visitors)
         gone.set()
         assert page.join(10)
         assert viewer.visitors == 0
