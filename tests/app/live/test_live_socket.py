@@ -257,14 +257,26 @@ def test_large_messages_are_refused_and_huge_ones_end_the_connection(page, port)
             }
         say(program, id=6, q=[0.3] * 6)
         assert heard(program, "done")["id"] == 6
-        page.taken.clear()
-        program.send(json.dumps({"q": [0.0] * 500_000}))
-        with pytest.raises(ConnectionClosed) as end:
-            heard(program, "done")
-        assert end.value.rcvd is not None
-        assert end.value.rcvd.code == 1009
+    codes = [_code_of_a_huge_message(page, port)]
+    while codes[-1] is None and len(codes) < 5:
+        codes.append(_code_of_a_huge_message(page, port))
+    assert codes[-1] == 1009
+
+
+def _send_and_hear(program, text):
+    program.send(text)
+    heard(program, "done")
+
+
+def _code_of_a_huge_message(page, port):
+    """The code that ends the connection; None: lost, where the system resets one with bytes that are not read."""
+    wait_for(lambda: page.line.program is None)
+    page.taken.clear()
+    with call(port, page.line.code) as program, pytest.raises(ConnectionClosed) as end:
+        _send_and_hear(program, json.dumps({"q": [0.0] * 500_000}))
     wait_for(lambda: page.line.program is None)
     assert "q" not in page.taken
+    return None if end.value.rcvd is None else end.value.rcvd.code
 
 
 @pytest.mark.full
