@@ -181,7 +181,7 @@ class ArmController:
     def _surroundings_changed(self, solve_again: bool) -> None:
         if solve_again:
             self._request_changed()
-        self._listener.on_pose(kin.fk(self.robot, self.q))
+        self._listener.on_pose()
 
     # Motions
 
@@ -392,7 +392,7 @@ class ArmController:
         self.scene.show(q)
         if not np.array_equal(q, self.q):
             self.q = q
-            self._listener.on_pose(T)
+            self._listener.on_pose()
         if self.target is not None and arrived and self._reached and not self.dragging:
             # A task that leaves some motion open is complete: the target now is where the tool really is.
             self.target = None

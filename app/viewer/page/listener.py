@@ -13,8 +13,8 @@ from kin.transforms import Array
 class ArmListener(Protocol):
     """Receives the controller's reports, on the worker's thread."""
 
-    def on_pose(self, T_base_tool: Array) -> None:
-        """The scene shows another configuration, with the tool at this pose ``(4, 4)``."""
+    def on_pose(self) -> None:
+        """The scene shows another configuration, or what is around it has changed."""
 
     def on_goal(self, dragged: int | None) -> None:
         """The arm is heading elsewhere; `dragged` is the index of the joint whose slider the visitor holds."""

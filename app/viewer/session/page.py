@@ -212,7 +212,7 @@ class VisitorPage(Worker):
         if viewpoint is not None:
             self.camera.restore(viewpoint)
 
-    def on_pose(self, T_base_tool: Array) -> None:
+    def on_pose(self) -> None:
         self.numbers.use_pose()
 
     def on_goal(self, dragged: int | None) -> None:

@@ -2,9 +2,11 @@
 
 import csv
 import gc
+import importlib.util
 import inspect
 import json
 import math
+import pkgutil
 import re
 import signal
 import subprocess
@@ -474,6 +476,12 @@ def test_each_row_of_the_commands_is_named_as_the_command():
 def test_each_row_of_the_commands_names_a_function_that_runs_it():
     for command in parser.COMMANDS:
         assert list(inspect.signature(command.load()).parameters) == ["arguments"], command.name
+        module, _, name = command.run.partition(":")
+        beside = importlib.util.find_spec(importlib.util.resolve_name(module, "app.cli"))
+        assert beside is not None
+        folders = beside.submodule_search_locations or []
+        names = {each.name for each in pkgutil.iter_modules(folders)}
+        assert name not in names, f"{command.name}: the module would take the place of the function"
 
 
 def test_version_and_help(capsys):
