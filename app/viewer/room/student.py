@@ -13,7 +13,6 @@ from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
 from app.viewer.declared.panel import Html, Node
-from app.viewer.live.feature import Connect
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.member import PRESS, Member, wanted
@@ -281,8 +280,7 @@ class Student(Member):
     def _tell(self) -> None:
         """Say what this page shows, if it is something else: of two tabs, the one that has changed last counts."""
         at = self.activity.exercise
-        driven = next((each.settings.driven for each in self.page.features if isinstance(each, Connect)), "")
-        shows = "" if at is None else at.id, self._gone and self.leader == "", driven
+        shows = "" if at is None else at.id, self._gone and self.leader == "", self.driven
         if shows != self._sent_last and self.attendance.room.seat is not None:
             self._sent_last = shows
             self.attendance.tell_task(shows[0])
