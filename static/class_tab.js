@@ -38,7 +38,7 @@
 
   const ANSWERS = "kinboard-answers";
   const keep = () => dom.tab.set(ANSWERS, JSON.stringify(answers)); // or only this page has them
-  let answers = JSON.parse(dom.tab.get(ANSWERS) ?? "[]"); // { id, place, kind, value, since }
+  let answers = dom.tab.json(ANSWERS, []); // { id, place, kind, value, since }
   let sent = new Set(); // ids of answers that were sent over this connection
   const member = () => $("[data-class-bar]:not([data-class-bar=closed])");
   const student = () => $("[data-class-bar]:not([data-class-bar=teacher], [data-class-bar=closed])");

@@ -8,6 +8,8 @@ const dom = (() => {
   const storage = (name) => ({
     get(key) { try { return globalThis[name].getItem(key); } catch { return undefined; } },
     set(key, value) { try { globalThis[name].setItem(key, value); } catch { /* see above */ } },
+    /** What is kept as JSON; `none` if that is nothing, or no JSON. */
+    json(key, none) { try { return JSON.parse(globalThis[name].getItem(key)) ?? none; } catch { return none; } },
     remove(key) { try { globalThis[name].removeItem(key); } catch { /* see above */ } },
   });
 

@@ -60,7 +60,7 @@
   const DRAFTS = "kinboard-drafts";
   const MOST_DRAFTS = 20; // questions
   const TYPED = ":is(input, textarea)[data-cell]:not([readonly])";
-  let drafts = JSON.parse(dom.tab.get(DRAFTS) ?? "[]"); // [question, { cell: [what is typed, what the service said before] }], the newest first
+  let drafts = dom.tab.json(DRAFTS, []); // [question, { cell: [what is typed, what the service said before] }], the newest first
   function keepDrafts(now) {
     drafts = now.slice(0, MOST_DRAFTS);
     dom.tab.set(DRAFTS, JSON.stringify(drafts));

@@ -113,11 +113,7 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
     @property
     def driven(self) -> str:
         """What a connected program drives with this page; empty: nothing."""
-        return "" if (connect := self._connect) is None else connect.settings.driven
-
-    @property
-    def _connect(self) -> Connect | None:
-        return next((each for each in self.page.features if isinstance(each, Connect)), None)
+        return "" if (connect := self.page.live.connect) is None else connect.settings.driven
 
     # To be overridden
 
@@ -256,7 +252,7 @@ class Member(DeclaredFeature[MemberSettings, Facts[MemberSettings]]):
 
         Returns what was said of it; None: there is none.
         """
-        driven, connect = self.driven, self._connect
+        driven, connect = self.driven, self.page.live.connect
         if connect is None or not connect.halt(f"Stopped: {why}."):
             return None
         notice = Notice("error", f"Stopped: {why}", f"{driven or 'Its program'} moves by your own hand only.")

@@ -66,8 +66,13 @@ class LiveInput:
             problem = self._problem_of(lambda name=name, value=value: self._used[name](value)) or problem  # type: ignore[misc]
         self._answer(line, pending.numbers, problem)
 
+    @property
+    def connect(self) -> Connect | None:
+        """The feature that shows the program and what it says; None: the page does not offer it."""
+        return next((each for each in self._page.features if isinstance(each, Connect)), None)
+
     def _draw(self, _: object) -> None:
-        feature = next((each for each in self._page.features if isinstance(each, Connect)), None)
+        feature = self.connect
         if (line := self._page.door.line) is None or feature is None:
             return
         pending = line.take("drawn")
@@ -162,7 +167,7 @@ class LiveInput:
         if line.program is None:
             self._done.clear()
             return
-        connect = next((each for each in page.features if isinstance(each, Connect)), None)
+        connect = self.connect
         values = {
             "q": page.arm.q,
             "gripper": page.arm.opening,
