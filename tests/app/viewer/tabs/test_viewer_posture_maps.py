@@ -57,6 +57,12 @@ def push(tab: FakeBrowser, label: str, button: str) -> None:
     tab.send("GuiUpdateMessage", uuid=tab.element(label), updates={"value": button})
 
 
+def progress(tab: FakeBrowser) -> list[float]:
+    """Of the page's progress bars: a finer map has other regions, and buttons of its own."""
+    bars = {uuid: message for uuid, message in tab.gui.items() if message["type"] == "GuiProgressBarMessage"}
+    return [tab.values.get(uuid, message["value"]) for uuid, message in bars.items()]
+
+
 def test_a_map_is_shown_with_its_regions_in_words_and_cleared(tab):
     push(tab, "Posture map", "Start")
     tab.wait(lambda: "Postures of UR5" in tab.html and " regions. A: " in tab.html, 30.0)
@@ -66,7 +72,7 @@ def test_a_map_is_shown_with_its_regions_in_words_and_cleared(tab):
 
 def test_a_region_becomes_the_target(tab):
     push(tab, "Posture map", "Start")
-    tab.wait(lambda: " regions. A: " in tab.html, 30.0)
+    tab.wait(lambda: " regions. A: " in tab.html and 100.0 in progress(tab), 30.0)
     tab.settle()
     before = tab.gizmo_pose()
     push(tab, "Go to region", "A")
