@@ -69,10 +69,6 @@ if TYPE_CHECKING:
     from app.service.web.agents import Agents
     from app.viewer.server import ViewerServer
 
-# Seconds that a thread may keep the interpreter while others wait. The event loop gives it away with each read and
-# write, and waits so long to have it back from the thread that solves: of 100 visitors who drag, one picture in
-# twenty took 1 s at 0.5 ms and takes 0.13 s at 0.1 ms, and no less below. Python's default is 5 ms.
-SWITCH_INTERVAL = 1e-4
 # Full collections are rare, besides those when the process is idle or has grown (`app.shared.memory.process`): one
 # among requests with many thousand targets stops all visitors for 80 ms, one of young objects for a millisecond.
 COLLECTIONS = (700, 10, 100)
@@ -289,7 +285,6 @@ def _serve(
     guard_log()
     if settings.access_log:
         write_to_stderr()
-    sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
     pool = Pool(settings.processes, settings, store) if settings.processes else None
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.

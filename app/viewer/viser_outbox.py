@@ -6,6 +6,10 @@ flush. A generator, a timer and two tasks then wait for the next message. That c
 that is pushed within `in_one_frame` leaves in one frame and wakes the loop once. A `LoopWaker` wakes it once for
 all visitors who are waiting.
 
+Of two threads that both have something to do, each takes the interpreter from the other with every read and write:
+thirty visitors who drag then cost a third more. So a step waits, at its end, until the loop has sent what it made,
+and has read what has come meanwhile (`LoopWaker.together`).
+
 It relies on private names of viser, which `app.viewer.viser_names.IMPROVEMENTS` lists; where one is missing,
 viser's buffer and its producer take its place. Tests compare the bytes with those of viser's own
 `_message_producer`. Upstream offers no way to replace its producer yet;
@@ -38,6 +42,7 @@ from app.viewer import viser_names
 logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
 _PLAIN = frozenset({str, bool, int, float})
+PATIENCE = 0.02  # s that a step waits for the loop
 
 
 class LoopWaker:
@@ -51,14 +56,17 @@ class LoopWaker:
 
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
-        """Wake the loop once, at the end, for what this thread calls within this context."""
+        """Wake the loop once, at the end, for what this thread calls within this context.
+
+        This returns when the loop has done it, or after `PATIENCE`; the loop's own thread must not use it.
+        """
         self._here.held = True
         try:
             yield
         finally:
             self._here.held = False
             if self._waiting:
-                self._wake()
+                self._wait_for_answer()
 
     def call(self, act: Callable[[], None]) -> None:
         """Have `act` called. Any thread may ask; nothing happens if the loop is closed."""
@@ -67,11 +75,26 @@ class LoopWaker:
         if not getattr(self._here, "held", False):
             self._wake()
 
-    def _wake(self) -> None:
+    def _wait_for_answer(self) -> None:
+        done = threading.Lock()
+        done.acquire()
+
+        def end() -> None:
+            self.loop.call_soon(done.release)  # after the tasks that were woken
+
+        self._waiting.append(end)
+        if self._wake():
+            done.acquire(timeout=PATIENCE)
+
+    def _wake(self) -> bool:
+        """Whether the loop will answer, or has done so: it does not if it is closed, and no visitor is left."""
         if not self._woken:
             self._woken = True
-            with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
+            try:
                 self.loop.call_soon_threadsafe(self._answer)
+            except RuntimeError:
+                return False
+        return True
 
     def _answer(self) -> None:
         self._woken = False

@@ -172,6 +172,33 @@ def test_a_step_is_one_frame_and_one_wake_up(sending: Sending) -> None:
     assert sending.wakes == before + 1
 
 
+def test_a_step_ends_when_its_frame_has_left(sending: Sending) -> None:
+    for k in range(50):
+        with sending.waker.together():
+            sending.box.push(turn(f"/{k}"))
+            sending.box.flush()
+        assert len(sending.line.frames) == k + 1
+
+
+def test_a_step_waits_for_a_loop_that_is_held_up_for_a_moment_only(sending: Sending) -> None:
+    going_on = threading.Event()
+    sending.loop.call_soon_threadsafe(going_on.wait, WAIT)
+    with sending.waker.together():
+        sending.box.push(turn("/a"))
+        sending.box.flush()
+    assert not sending.line.frames
+    going_on.set()
+    sending.wait([["/a"]])
+
+
+def test_a_step_ends_without_a_loop() -> None:
+    loop = asyncio.new_event_loop()
+    loop.close()
+    waker = LoopWaker(loop)
+    with waker.together():
+        waker.call(lambda: None)
+
+
 def test_the_newest_pose_of_a_node_replaces_one_that_waits(sending: Sending) -> None:
     with sending.box.hold():
         for w in (0.1, 0.2, 0.3):
