@@ -63,6 +63,7 @@ PROTOCOLS = PrivateUse(
         f"{_SOCKET}.loop",
         f"{_SOCKET}.ping_interval",
         f"{_SOCKET}.queue",
+        f"{_SOCKET}.read_paused",
         f"{_SOCKET}.transport",
         "websockets.protocol:Protocol.max_message_size",
     ),

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 PIECE: Final = 4096  # bytes parsed before frames are counted
 MAX_WAITING: Final = 4096  # messages that are parsed and not read; those of pages are longer than 64 bytes
+AHEAD: Final = 8  # messages that are read while the first waits
 MAX_FRAGMENTS: Final = 64  # of one message
 PING_RATE, PING_BURST = 30.0, 60.0  # pings and pongs of a client in a second, and at once
 LIVE_PING: Final = 2.0  # s between two of ours to a page's program: the page shows how long an answer takes
@@ -102,8 +103,14 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                 b"".join(self.frames).decode()
         except UnicodeDecodeError:
             self._end(CloseCode.INVALID_DATA, "a text message that is not UTF-8")
-        else:
+            return
+        if self.read_paused or self.queue.qsize() >= AHEAD:
             super().send_receive_event_to_app()
+        else:
+            # uvicorn stops reading at each message until it is taken: two system calls for every event of a drag.
+            self.read_paused = True
+            super().send_receive_event_to_app()
+            self.read_paused = False
 
     def _end(self, code: CloseCode, why: str) -> None:
         """Disconnect a client because of what it has sent; nothing happens if that was done."""

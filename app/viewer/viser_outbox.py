@@ -42,7 +42,7 @@ from app.viewer import viser_names
 logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
 _PLAIN = frozenset({str, bool, int, float})
-PATIENCE = 0.02  # s that a step waits for the loop
+PATIENCE = 0.005  # s that a step waits for the loop
 
 
 class LoopWaker:

@@ -38,6 +38,7 @@ from app.viewer.viser_patches import note_heard
 log = logging.getLogger(__name__)
 
 PROTOCOL = f"viser-v{viser.__version__}"
+IN_A_ROW = 8  # messages of a burst, after which others come
 STOP_TIMEOUT = 2.0  # s for all connections to end
 
 _Callbacks = Sequence[Callable[[infra.WebsockClientConnection], Coroutine[Any, Any, None] | None]]
@@ -139,7 +140,7 @@ class PortlessServer(infra.WebsockServer):
 
     async def _consume(self, connection: Connection, client: infra.WebsockClientConnection) -> None:
         number = infra.ClientId(client.client_id)
-        while True:
+        for count in itertools.count(1):
             data = await connection.receive()
             try:
                 message = self._message_class.deserialize(data)
@@ -148,7 +149,8 @@ class PortlessServer(infra.WebsockServer):
             for handler in (self, client):
                 if type(message) in handler._incoming_handlers:
                     await self._handle(handler, number, message)
-            await asyncio.sleep(0)  # others come between the messages of a burst
+            if count % IN_A_ROW == 0:
+                await asyncio.sleep(0)  # others come between the messages of a burst
 
     async def _handle(
         self, handler: infra.WebsockMessageHandler, number: infra.ClientId, message: infra.Message

@@ -159,15 +159,15 @@ class Found:
 
     def _multiple(self) -> int:
         """How many solutions are isolated and on several rows."""
-        if self.curves:
+        if self.curves or len(self._every) == 1:
             return 0
-        branches, rare = self._branches, [k for k, p in enumerate(self._branches.redundancies) if p.rare]
-        if len(self._every) == 1:
+        branches, rows = self._branches, np.array(self._order)
+        apart = np.abs(branches.q[rows][:, None] - branches.q[self._every]).max(axis=2)
+        several = rows[np.count_nonzero(apart <= TOLERANCES.merge, axis=1) > 1]
+        if not several.size:
             return 0
-        rows = np.array(self._order)
-        alone = rows[np.isnan(branches.values[rows][:, rare]).all(axis=1)]
-        apart = np.abs(branches.q[alone][:, None] - branches.q[self._every]).max(axis=2)
-        return int(np.count_nonzero((apart <= TOLERANCES.merge).sum(axis=1) > 1))
+        rare = [k for k, p in enumerate(branches.redundancies) if p.rare]
+        return int(np.count_nonzero(np.isnan(branches.values[several][:, rare]).all(axis=1)))
 
     @property
     def singularities(self) -> tuple[Singularity, ...]:
