@@ -93,14 +93,15 @@ class DeclaredFeature(Feature, Generic[S, F]):
     @property
     def due(self) -> float | None:
         """See `Feature`: its own, or that of a part, whichever is earlier."""
+        due = None if self._due_at is None else max(0.0, self._due_at - time.perf_counter())
         if not self._parts:
-            return self._due
-        dues = self._due, *(part.due for part in self._parts.values())
+            return due
+        dues = due, *(part.due for part in self._parts.values())
         return min((due for due in dues if due is not None), default=None)
 
     @due.setter
     def due(self, seconds: float | None) -> None:
-        self._due = seconds
+        self._due_at = None if seconds is None else time.perf_counter() + seconds
 
     # To be overridden
 
@@ -335,6 +336,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def tick(self, now: float) -> None:
         self.for_parts(lambda part: None if part.due is None else part.tick(now))
+        early = self._due_at is not None and self._due_at > now
+        if early and not self._stale and self.settings is self.read.settings:
+            return  # called after a step of something else
         self.due, again = None, None
         self.invalidate()
         if self._stale or (self.facts is not self.read and now - self.shown_at >= self._interval):
