@@ -1,7 +1,8 @@
 "use strict";
 // Runs in viser's page: the frame around it while a connected program drives something with it, with the button that stops that,
 // and the question before a press of a button that the program wants confirmed (templates/live/announced.html). The frame is
-// beside viser's page, so that it stays when the panel is folded away. lesson.js sends what is pressed.
+// beside viser's page, so that it stays when the panel is folded away. lesson.js sends what is pressed. What stops something can
+// be pressed whatever dialog is open.
 (() => {
   const { element } = dom;
   const frame = document.getElementById("kb-driven");
@@ -22,19 +23,30 @@
   channel.watch("driven", (value) => { name = value; draw(); });
   channel.watch("stop", (value) => { stop = value; draw(); });
 
+  // A dialog makes all that is beside it inert: while one is open, the frame is in it.
+  const home = frame.parentNode;
+  viserPage.watch(() => {
+    const place = document.querySelector("dialog:modal") ?? home;
+    if (frame.parentNode !== place) place.append(frame);
+  }, { on: ["open"] });
+
   // The question. Esc, Cancel and a click beside it answer no, and so does anything else that the program says meanwhile.
   const dialog = document.getElementById("kb-confirm");
   const [title, words, buttons] = dialog.children;
+  const [no, yes] = buttons.children;
   dialog.addEventListener("click", ({ target }) => { if (target === dialog || target.closest("button")) dialog.close(); });
   let asked = ""; // selector of the button that was pressed
 
-  dom.on("click", "[data-confirm]", ({ textContent, dataset: { confirm, questionKey, argument } }) => {
+  dom.on("click", "[data-confirm]", (pressed) => {
+    const { textContent, dataset: { confirm, questionKey, argument } } = pressed;
     asked = `[data-confirm][data-question-key="${questionKey}"][data-argument="${argument}"]`;
     const label = textContent.replace(/\s*…$/, "");
     title.textContent = `${label}?`;
     words.textContent = confirm;
-    buttons.lastElementChild.textContent = label;
-    Object.assign(buttons.lastElementChild.dataset, { questionKey, argument });
+    yes.textContent = label;
+    Object.assign(yes.dataset, { questionKey, argument });
+    const stops = dom.all("[data-guide-do=halt]", pressed.closest("[data-announced]")).map((button) => button.cloneNode(true));
+    buttons.replaceChildren(...stops, no, yes);
     dialog.showModal();
   });
   viserPage.watch(() => { if (dialog.open && !document.querySelector(asked)) dialog.close(); }, { delay: 50 });

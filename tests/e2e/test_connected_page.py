@@ -63,9 +63,9 @@ def connected(tab: Tab, address: str) -> Iterator[Any]:
     expect(withdraw).to_have_count(0)
 
 
-def assert_framed(tab: Tab) -> None:
+def assert_framed(tab: Tab, more: str = "") -> None:
     frame = tab.page.locator("#kb-driven")
-    expect(frame).to_have_text(WORDS)
+    expect(frame).to_have_text(WORDS + more)
     seen = tab.page.evaluate(SEEN)
     assert seen.pop("width") >= "4px"
     assert seen == {
@@ -159,6 +159,46 @@ def test_what_a_program_offers_is_pressed_with_a_second_step_and_stopped_at_once
     assert driving.target is None, "keys of the scene rest while something is asked"
     driving.announce(None)
     expect(stop).to_have_count(0)
+
+
+RELEASE = {"name": "release", "label": "Release", "confirm": "Hold the arm with your hand, or it falls."}
+
+
+def test_what_stops_is_within_reach_whatever_dialog_is_open(tab: Tab, driving: Any) -> None:
+    page, dialog, overview = tab.page, tab.page.locator("#kb-confirm"), tab.page.locator("#kb-keys")
+    events = (event.value for event in driving.events() if event.kind == "pressed")
+    driving.announce("The arm follows this page at up to 20 deg/s.", [STOP, RELEASE], state="enabled")
+    release, frame = tab.status.get_by_role("button", name="Release"), page.locator("#kb-driven")
+    stop = frame.get_by_role("button", name="Stop")
+    for place in (frame, dialog.locator("footer")):
+        release.click()
+        expect(dialog.get_by_role("button", name="Cancel")).to_be_focused()
+        tab.screenshot("release-asked")
+        assert_framed(tab, " Stop")
+        place.get_by_role("button", name="Stop").click()
+        assert next(events) == "stop"
+        expect(dialog).to_be_hidden()
+    assert_framed(tab, " Stop")
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("?")
+    expect(overview).to_be_visible()
+    stop.click()
+    assert next(events) == "stop", "with the overview of the keys open"
+    page.keyboard.press("Escape")
+    expect(overview).to_be_hidden()
+    page.keyboard.press("Control+k")
+    commands = page.get_by_placeholder("Search commands...")
+    expect(commands).to_be_focused()
+    stop.click()
+    assert next(events) == "stop", "with the list of commands open"
+    page.keyboard.press("Escape")
+    expect(commands).to_have_count(0)
+    driving.drives = None
+    expect(frame).to_be_hidden()
+    release.click()
+    dialog.get_by_role("button", name="Stop").press("Enter")
+    assert next(events) == "stop", "of a program that does not say what it drives"
+    driving.announce(None)
 
 
 OPEN = """([name, text, drop]) => {
