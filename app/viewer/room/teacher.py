@@ -36,7 +36,7 @@ CHOICES = ("Elbow up", "Elbow down")
 class Teacher(Member):
     """The teacher's page."""
 
-    led_why = "this page shows a student’s arm"
+    led_why, returned_why = "this page shows a student’s arm", "this page goes back to where its own arm was"
     messages = frozenset(
         {
             *("follow", "freeze", "fields", "untask", "uncourse", "close", "unask", "look", "return", "show"),
@@ -214,11 +214,14 @@ class Teacher(Member):
         before, self._before = self._before, None
         if before is None:
             return
+        stopped = self.stop_driven(self.returned_why)
         self.page.adopt(before)
         if before.camera is not None:
             self.page.camera.restore(before.camera)
         elif self.page.camera.chosen is not None:
             self.page.camera.aim(self.page.arm.scene.body, glide=True)
+        if stopped is not None:
+            self.page.status.show(stopped)  # what is shown has had words of its own
 
     # The wall
 

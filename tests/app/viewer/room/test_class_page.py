@@ -836,6 +836,44 @@ def test_the_teachers_own_arm_is_stopped_before_a_students_is_shown(room: Class,
 
 
 @pytest.mark.full
+def test_the_teachers_own_arm_is_stopped_before_the_page_goes_back_to_where_it_was(
+    room: Class, lines: list[Line]
+) -> None:
+    teacher, (_, ticket) = room.teacher(), room.join("Ann")
+    line = drive(teacher, lines, STOP)
+    there = ROBOT.q_home.copy()
+    there[0] += 0.6
+    first, last = (kin.motion.Ptp(kin.motion.JointTarget(q)) for q in (ROBOT.q_home, there))
+    line.send({"program": kin.motion.Program((first, last)), "play": True})
+    teacher.wait(lambda: line._values["q"][1][0] > ROBOT.q_home[0] + 0.01)
+    press(teacher, "wall")
+    teacher.wait(lambda: "data-class-wall" in teacher.html)
+    teacher.wait(lambda: np.allclose(line._values["q"][1], there, atol=1e-4))
+    assert pressed(line) == [], "the wall is beside the arm"
+    pressed_first: list[bool] = []
+    publish = line.publish
+
+    def published(name: str, value: Any, anew: bool = True) -> None:
+        if name == "q" and not np.allclose(value, there, atol=1e-4):
+            pressed_first.append(bool(line._replies))
+        publish(name, value, anew)
+
+    line.publish = published  # type: ignore[method-assign]
+    press(teacher, "wall")
+    teacher.wait(lambda: "Stopped: this page goes back to where its own arm was." in teacher.html)
+    teacher.wait(lambda: bool(pressed_first))
+    assert pressed_first[0], "the press is sent before the first joint"
+    assert pressed(line) == ["stop"]
+    line.send({"drives": None, "announce": Announcement("It holds its place.", "stopped", (STOP,))})
+    teacher.wait(lambda: teacher.shown["driven"] == "")
+    press(teacher, "look", ticket.seat)
+    teacher.wait(lambda: "data-class-looked" in teacher.html)
+    press(teacher, "return")
+    teacher.wait(lambda: "data-class-looked" not in teacher.html)
+    assert pressed(line) == [], "what has stopped is not stopped again"
+
+
+@pytest.mark.full
 def test_what_begins_to_be_driven_ends_a_lead_or_is_stopped_in_a_frozen_class(
     room: Class, lines: list[Line]
 ) -> None:
