@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page import Tab
+from page import BLIND, WAIT, Tab
 from playwright.sync_api import Browser, expect
 
 import kin
@@ -85,6 +85,20 @@ def test_the_page_follows_the_colours_of_the_system(tab: Tab) -> None:
     expect(root).to_have_attribute("data-mantine-color-scheme", "light")
     page.emulate_media(color_scheme="light")
     tab.choose("Page colours", "Like the system")
+
+
+@pytest.mark.full
+def test_a_page_that_may_only_look_follows_the_colours_of_the_system(
+    browser: Browser, read_only_address: str
+) -> None:
+    page = browser.new_page(color_scheme="light")
+    page.add_init_script(BLIND)
+    page.goto(read_only_address + "viewer/")
+    expect(page.locator("[data-looking]")).to_be_attached(timeout=WAIT)
+    for scheme in ("dark", "light"):
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
+    page.close()
 
 
 @pytest.mark.full
