@@ -280,6 +280,35 @@ def test_who_may_only_look_sees_the_keys_that_work_then(browser: Browser, read_o
     expect(shown).to_be_visible()
     assert shown.locator("caption:visible").all_inner_texts() == ["Anywhere", "Scene"]
     assert shown.locator("th:visible").all_text_contents() == ["?", "B", "W, A, S, D, Q, E, arrow keys"]
+    page.goto(read_only_address + "viewer/?embed=panel")
+    expect(page.locator("[data-looking]")).to_be_attached(timeout=WAIT)
+    page.keyboard.press("?")
+    expect(shown).to_be_visible()
+    assert shown.locator("th:visible").all_text_contents() == ["?", "W, A, S, D, Q, E, arrow keys"]
+    page.close()
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("mode", ["1", "panel"])
+def test_within_another_page_the_keys_that_work_are_listed(browser: Browser, address: str, mode: str) -> None:
+    page, panel = browser.new_page(), mode == "panel"
+    page.add_init_script(BLIND)
+    page.goto(f"{address}viewer/?embed={mode}")
+    expect(page.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=WAIT)
+    page.keyboard.press("?")
+    shown = page.get_by_role("dialog", name="Keys")
+    expect(shown).to_be_visible()
+    nowhere = {"The DH table"} if panel else {"The DH table", "A joint's slider", "The field beside it"}
+    idle = {"Ctrl+K", "B"} if panel else {"Ctrl+K", "B", "T"}
+    works = [key for where, key, _ in documented() if where not in nowhere and key not in idle]
+    assert sorted(shown.locator("th:visible").all_text_contents()) == sorted(works)
+    expect(shown).not_to_contain_text("tab View", use_inner_text=True)
+    page.keyboard.press("Escape")
+    expect(shown).to_be_hidden()
+    page.keyboard.press("Control+k")
+    page.keyboard.press("t")
+    expect(page.locator("[data-typed] textarea")).to_be_visible(visible=panel)
+    expect(page.get_by_placeholder("Search commands...")).to_have_count(0)
     page.close()
 
 
