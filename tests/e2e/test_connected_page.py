@@ -288,5 +288,6 @@ def test_the_words_fit_a_phone(phone: Tab, address: str) -> None:
         phone.status.get_by_role("button", name="Enable").click()
         expect(phone.page.locator("#kb-confirm")).to_be_visible()
         phone.screenshot("enable-asked-phone")
+        in_frame.click(trial=True)
         phone.page.get_by_role("button", name="Cancel").click()
         in_frame.click(trial=True)
