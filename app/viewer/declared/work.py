@@ -28,12 +28,15 @@ class Work:
     Attributes:
         key: of its result.
         begin: called with `args`. It returns the result; or an iterator, of which the worker takes one item when
-            it is idle, each the result so far or None; or a subscription of a shared computation.
+            it is idle, each the result so far, or None, or a `Wait`; or a subscription of a shared computation.
         rest: begins when the arguments have been the same for so long (s).
         pace: begins at most once in so many seconds.
         poll: looks at the progress of a shared computation at this interval (s); 0: at its end alone.
         keep: whether its last result stays until there is another. What is under way with other arguments is then
             finished first, so that there are results while an arm moves.
+        every: an iterator goes on after so many seconds, or earlier if something else happens.
+        goes_on: whether it goes on with other arguments from what it has come to: `begin` also gets its last
+            result, None at first, which stays until there is another.
     """
 
     key: str
@@ -43,6 +46,15 @@ class Work:
     pace: float = 0.0
     poll: float = 0.0
     keep: bool = False
+    every: float = 0.0
+    goes_on: bool = False
+
+
+@dataclass(frozen=True)
+class Wait:
+    """What an iterator gives if it has nothing to do for so many seconds, unless something happens."""
+
+    seconds: float
 
 
 def in_background(compute: Callable[..., Any]) -> Callable[..., Subscription[Any]]:
@@ -154,7 +166,7 @@ class Runner:
         elif not (job.task is not None and work.keep) and not same(work.args, job.args):
             self._end(job)
             job.args, job.since, job.waits = work.args, now, True
-            if not work.keep:
+            if not (work.keep or work.goes_on):
                 self._set(work.key, None)
         if job.waits:
             if (wait := max(work.rest - (now - job.since), work.pace - (now - job.begun))) > 0.0:
@@ -164,13 +176,16 @@ class Runner:
         return None if job.task is None else self._look(work, job)
 
     def _begin(self, work: Work, job: _Job) -> None:
+        last = self.results.get(work.key, NOTHING).value
         try:
-            found = work.begin(*job.args)
+            found = work.begin(*job.args, last) if work.goes_on else work.begin(*job.args)
         except Exception as error:  # noqa: BLE001 - it is in the result
             self._set(work.key, Result(finished=True, error=error))
             return
         if isinstance(found, Iterator | Subscription):
             job.task = found
+            if work.goes_on:
+                self._set(work.key, Result(last))  # not finished any more
         else:
             self._set(work.key, Result(found, finished=True))
         if isinstance(found, Subscription) and not found.finished:
@@ -199,9 +214,11 @@ class Runner:
         if found is _END:
             job.task = None
             self._set(work.key, Result(last.value, finished=True))
+        elif isinstance(found, Wait):
+            return found.seconds
         elif found is not None and found is not last.value:
             self._set(work.key, Result(found))
-        return 0.0
+        return work.every
 
     @staticmethod
     def _end(job: _Job) -> None:

@@ -7,11 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 from app.viewer.declared.panel import Buttons, Control, Event, Folder, Html, Node, Progress
-from app.viewer.tabs.workspace.said import Said
+from app.viewer.tabs.workspace import colours, views
+from app.viewer.tabs.workspace.facts import WorkspaceFacts
 from app.viewer.tabs.workspace.settings import FINE, MAX_POINTS, MIN_SIZE, NONE, WorkspaceSettings
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.units import Unit, grouped
+from kin.units import grouped
 
 SMOOTH = 200_000  # points: a picture of them takes some tenths of a second without a graphics card
 PRESETS = {"10 k": 10_000, "100 k": 100_000, "1 M": 1_000_000, "4 M": MAX_POINTS}
@@ -28,17 +29,9 @@ def spec(path: str) -> Any:
     return WorkspaceSettings.spec(path)
 
 
-def form(
-    settings: WorkspaceSettings,
-    said: Said,
-    robot: Robot,
-    others: tuple[Robot, ...],
-    unit: Unit,
-    picked: Html,
-    sizes: Html,
-) -> list[Node]:
+def form(f: WorkspaceFacts, others: tuple[Robot, ...], picked: Html, sizes: Html) -> list[Node]:
     """Everything between cloud and tools, but for what has events of its own; `others`: robots to compare with."""
-    cut = settings.cut
+    settings, robot, unit, cut = f.settings, f.robot, f.units.lengths, f.settings.cut
     point = replace(spec("size"), step=unit.shown(MIN_SIZE, FINE))
     closed = [Control("axis"), Control("keep", visible=cut is not None)]
     if cut is not None:
@@ -50,7 +43,7 @@ def form(
     return [
         Control("by"),
         Control("map"),
-        Html(str, (said.legend,), key="legend"),
+        _legend(f),
         Control("size", spec=point, label=f"Point size ({unit.name})"),
         Folder("Cut open", closed),
         Folder(
@@ -68,15 +61,28 @@ def form(
     ]
 
 
-def cloud(settings: WorkspaceSettings, said: Said, actions: Mapping[str, Event]) -> list[Node]:
+def _legend(f: WorkspaceFacts) -> Html:
+    """The meaning of the colours. None without points, because it needs sampled data, and for an old cloud."""
+    if f.old or not any(one.parts for one in f.clouds):
+        return Html(str, key="legend")
+    if f.other is None and f.settings.by != "one":
+        scale = colours.scale_of(f.robot, f.settings.by)
+        return Html(colours.legend, (scale, f.settings.map, f.units), key="legend")
+    names = [(one.look.colour, one.cloud.robot.name) for one in f.wanted]
+    return Html(colours.names_legend, (names,), key="legend")
+
+
+def cloud(f: WorkspaceFacts, actions: Mapping[str, Event]) -> list[Node]:
     """The controls of the cloud itself."""
+    n, drawn = f.settings.n, f.stream.points
+    line = f.state, drawn, f.total or n, f.speed, f.locked, f.old
     return [
-        Html(heavy, (settings.n,), key="heavy"),
+        Html(heavy, (n,), key="heavy"),
         Control("strategy"),
         Control("seed"),
-        Buttons("Cloud", actions, CLOUD_HINT, said.buttons),
-        Progress(said.percent),
-        Html(str, (said.line,), key="line"),
+        Buttons("Cloud", actions, CLOUD_HINT, views.buttons(f.state, f.old)),
+        Progress(f.percent),
+        Html(views.progress, line, key="line"),
     ]
 
 

@@ -22,7 +22,7 @@ from app.shared.clouds import Cloud, Clouds
 from app.shared.computations import SharedComputation
 from app.viewer.declared.scene import Node
 from app.viewer.panel import Post
-from app.viewer.tabs.workspace.cloud_nodes import CloudNodes
+from app.viewer.tabs.workspace.cloud import Drawn, Shown
 from kin import InputError
 from kin.transforms import Array, finite_array
 
@@ -90,15 +90,20 @@ class Click(NamedTuple):
     size: float
 
     @classmethod
-    def of(cls, ray: object, nodes: CloudNodes, size: float) -> Click:
-        """The click of a ray that the page has sent; raises `InputError`."""
+    def of(cls, ray: object, drawn: Drawn, shown: Shown, size: float) -> Click:
+        """The click of a ray that the page has sent; `shown`: the visible slabs of a cut. Raises `InputError`."""
         if not isinstance(ray, tuple) or len(ray) != 2:
             raise InputError("ray", ray, "its origin and direction")
         origin, direction = finite_array("ray", ray[0], (3,)), finite_array("ray", ray[1], (3,))
         length = float(np.linalg.norm(direction))
         if not length > 0.0:
             raise InputError("ray", ray, "a direction that is not zero")
-        return cls(nodes.cloud, nodes.parts, nodes.visible_points(), origin, direction / length, size)
+        cut, slabs = drawn.look.cut, shown(drawn.look.cut)
+
+        def visible(points: NDArray[np.float32]) -> NDArray[np.bool_] | None:
+            return None if cut is None or slabs is None else slabs[cut.slabs(points)]
+
+        return cls(drawn.measured, drawn.parts, visible, origin, direction / length, size)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from app.shared.clouds import Cloud
 from app.viewer.declared.fields import Settings, choice, flag, memory, number, slider
 from app.viewer.tabs.workspace.colours import BY, MAPS, By
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Axis, Cut, Keep
@@ -11,6 +16,8 @@ from app.viewer.tabs.workspace.pick import Click
 from kin import Robot
 from kin.units import grouped
 from kin.workspace import Strategy
+
+Flow = Literal["running", "paused", "stopped"]
 
 MAX_POINTS = 4_000_000  # points of a cloud in a browser
 MAX_SEED = (1 << 53) - 1
@@ -61,6 +68,9 @@ class WorkspaceSettings(Settings):
         sizes, section, axes: whether the sizes, the section plot and axes with numbers are shown.
         clicks: whether a click moves the arm to a point.
         cut: along `axis`.
+        seen: the slabs that were visible of cuts before, of which there are still points in the scene.
+        cloud: the one that was started last, without what its colours need.
+        flow: whether its points are to come.
         opens, opened: whether a new map is cut open (until the visitor chooses a cut), and whether the present
             cut was made so.
         click: the last one into the cloud.
@@ -96,6 +106,9 @@ class WorkspaceSettings(Settings):
     axes: bool = flag("Axes with numbers", hint=AXES_HINT)
     clicks: bool = flag("Click on a point", True, hint=CLICKS_HINT)
     cut: Cut | None = memory()
+    seen: tuple[tuple[Cut | None, NDArray[np.bool_] | None], ...] = memory(())
+    cloud: Cloud | None = memory()
+    flow: Flow = memory("running")
     opens: bool = memory(True, renew=False)
     opened: bool = memory(False)
     click: Click | None = memory()

@@ -21,7 +21,7 @@ from app.viewer.declared.fields import Settings, memory
 from app.viewer.declared.panel import Html, Node, same
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.declared.scene import frame
-from app.viewer.declared.work import Runner, Sweep, Work, in_background
+from app.viewer.declared.work import NOTHING, Runner, Sweep, Wait, Work, in_background
 from app.viewer.feature import Feature
 from kin import InputError, Obstacle
 
@@ -108,6 +108,39 @@ def test_what_is_under_way_is_finished_first_if_its_result_is_kept_and_dropped_o
             found = one.results.get("one")
             values += [] if found is None else [found.value]
         assert values == expected
+
+
+def test_an_iterator_may_wait() -> None:
+    one, declared = runner(), [work(items(1, Wait(0.5), 2)), Work("other", items(3))]
+    assert one.go_on(declared, 0.0) == (0.0, ["one"])
+    assert one.go_on(declared, 0.0) == (0.0, ["other"]), "other work goes on meanwhile"
+    assert one.results["one"].value == 1
+    assert one.go_on(declared, 0.0) == (0.0, ["one"]), "it is asked again whenever something happens"
+    assert one.results["one"].value == 2
+
+
+def test_work_that_goes_on_begins_with_its_last_result_which_stays_meanwhile() -> None:
+    one = runner()
+
+    def count(to: int, last: int | None) -> Iterator[int | None]:
+        yield None
+        yield from range((last or 0) + 1, to + 1)
+
+    def until(to: int, value: int) -> None:
+        while one.results.get("one", NOTHING).value != value:
+            assert one.go_on([work(count, to, goes_on=True)], 0.0)[0] == 0.0
+
+    until(9, 2)
+    one.go_on([work(count, 4, goes_on=True)], 0.0)
+    assert (one.results["one"].value, one.results["one"].finished) == (2, False), "it stays"
+    until(4, 4)
+    while one.go_on([work(count, 4, goes_on=True)], 0.0)[0] is not None:
+        pass
+    assert one.results["one"].finished
+    one.go_on([work(count, 6, goes_on=True)], 0.0)
+    assert (one.results["one"].value, one.results["one"].finished) == (4, False)
+    one.go_on([], 0.0)
+    assert one.results == {}
 
 
 def test_errors_are_results() -> None:
