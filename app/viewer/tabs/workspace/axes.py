@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import viser
 
 from app.exports.svg import tick_labels
-from app.viewer.labels import add_label
+from app.viewer.declared.scene import Node, label, lines
 from app.viewer.scene.floor import INK_DARK, INK_LIGHT
-from app.viewer.tabs.workspace.roots import new_root
 from kin import Robot
 from kin.transforms import Array
 from kin.units import Units
@@ -29,60 +27,46 @@ def box_of(robot: Robot) -> tuple[Array, Array]:
     return low - room, high + room
 
 
-class Axes:
-    """The axes of one visitor's scene.
+@lru_cache(maxsize=256)
+def corners_of(robot: Robot) -> Array:
+    """The ends of the axes and the places of their titles ``(4, 3)``: what a picture of them has to contain."""
+    low, high = box_of(robot)
+    return np.vstack([low, *(_title_place(low, high, axis) for axis in range(3))])
 
-    Attributes:
-        corners: the ends of the axes and the places of their titles ``(n, 3)``; None: no axes are shown.
-    """
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._scene = scene
-        self._top: viser.FrameHandle | None = None
-        self._shown: tuple[Robot, Units, bool] | None = None
-        self.corners: Array | None = None
+def _edge(low: Array, high: Array, axis: int) -> tuple[Array, Array]:
+    """The ends ``(3,)`` of an axis of this box."""
+    start = low.copy()
+    # The vertical axis stands at another corner than that where x and y meet: their numbers are apart.
+    start[1] = high[1] if axis == 2 else start[1]
+    end = start.copy()
+    end[axis] = high[axis]
+    return start, end
 
-    def show(self, robot: Robot | None, units: Units, dark: bool) -> None:
-        """Draw the axes of this arm's workspace; None: no axes."""
-        wanted = None if robot is None else (robot, units, dark)
-        if wanted == self._shown:
-            return
-        self.remove()
-        self._shown = wanted
-        if robot is not None:
-            self._draw(*box_of(robot), units, INK_DARK if dark else INK_LIGHT)
 
-    def remove(self) -> None:
-        """Remove the axes."""
-        if self._top is not None:
-            self._top.remove()
-        self._top = self._shown = self.corners = None
+def _title_place(low: Array, high: Array, axis: int) -> Array:
+    """A place ``(3,)`` beyond the end of an axis of this box."""
+    place: Array = _edge(low, high, axis)[1] + 0.05 * float((high - low).max()) * np.eye(3)[axis]
+    return place
 
-    def _draw(self, low: Array, high: Array, units: Units, ink: tuple[int, int, int]) -> None:
-        root, scene, unit = new_root(), self._scene, units.lengths
-        self._top = scene.add_frame(root, show_axes=False)
-        size = float((high - low).max())
-        segments, titles = [], []
-        for axis, letter in enumerate("xyz"):
-            start = low.copy()
-            # The vertical axis stands at another corner than that where x and y meet: their numbers are apart.
-            start[1] = high[1] if axis == 2 else start[1]
-            end = start.copy()
-            end[axis] = high[axis]
-            out = np.zeros(3)
-            out[1 if axis != 1 else 0] = 0.02 * size * (1.0 if axis == 2 else -1.0)
-            segments.append([start, end])
-            if high[axis] - low[axis] >= LEAST:
-                for value, text in tick_labels(float(low[axis]), float(high[axis]), unit.scale):
-                    at = start.copy()
-                    at[axis] = value
-                    segments.append([at, at + out])
-                    name = f"{root}/{letter}{text}"
-                    add_label(scene, name, text, position=at + 2.4 * out, scale=0.75, anchor="center-center")
-            title = f"{letter} ({unit.name})"
-            beyond = end + 0.05 * size * np.eye(3)[axis]
-            titles.append(beyond)
-            add_label(scene, f"{root}/{letter}", title, position=beyond, scale=0.9, anchor="center-center")
-        self.corners = np.vstack([low, *titles])
-        lines = np.array(segments, np.float32)
-        scene.add_line_segments(f"{root}/lines", lines, ink, thickness=1.5, thickness_units="screen")
+
+def nodes(robot: Robot, units: Units, dark: bool) -> list[Node]:
+    """The axes of this arm's workspace."""
+    (low, high), unit = box_of(robot), units.lengths
+    size = float((high - low).max())
+    segments, labels = list[list[Array]](), list[Node]()
+    for axis, letter in enumerate("xyz"):
+        start, end = _edge(low, high, axis)
+        out = np.zeros(3)
+        out[1 if axis != 1 else 0] = 0.02 * size * (1.0 if axis == 2 else -1.0)
+        segments.append([start, end])
+        if high[axis] - low[axis] >= LEAST:
+            for value, text in tick_labels(float(low[axis]), float(high[axis]), unit.scale):
+                at = start.copy()
+                at[axis] = value
+                segments.append([at, at + out])
+                labels.append(label(f"{letter}{text}", text, at + 2.4 * out, 0.75))
+        labels.append(label(letter, f"{letter} ({unit.name})", _title_place(low, high, axis), 0.9))
+    drawn = [lines("lines", segments, INK_DARK if dark else INK_LIGHT, 1.5), *labels]
+    # Of its own for each unit: other numbers stand at other places.
+    return [Node("frame", f"axes-{unit.name}", {"show_axes": False}, children=drawn, keep=False)]

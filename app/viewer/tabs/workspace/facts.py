@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from app.exports.svg import Plot
 from app.shared.clouds import Cloud
 from app.viewer.declared.facts import Facts
-from app.viewer.tabs.workspace import colours
+from app.viewer.tabs.workspace import axes, colours
 from app.viewer.tabs.workspace.cloud import REST, Drawn, Look, Sheet, Stream, Wanted
 from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from app.viewer.tabs.workspace.views import State
 from kin import Robot, get_robot
 from kin.ik.options import FREE, Locks
+from kin.transforms import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,11 @@ class WorkspaceFacts(Facts[WorkspaceSettings]):
         if cut == self.settings.cut:
             return self.slabs
         return next((slabs for before, slabs in self.settings.seen if before == cut), None)
+
+    @property
+    def corners(self) -> Array | None:
+        """The points ``(n, 3)`` at the ends of the axes with numbers; None: they are not shown."""
+        return axes.corners_of(self.robot) if self.settings.axes else None
 
     # What is drawn
 

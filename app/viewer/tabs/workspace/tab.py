@@ -1,7 +1,8 @@
 """The workspace tab: its settings, and the events between its parts.
 
-Each part has a module: `cloud` (points in the scene), `cut`, `pick` (clicks on points), `sizes`, `section`, and
-the folder `capability`. Points come from the service's cache of clouds; what else takes long is declared as work.
+Each part has a module: `cloud` (the stream of points), `cut`, `pick` (clicks on points), `axes`, `sizes`,
+`section`, and the folders `capability` and `postures`. All that takes long is declared as work; what is known of
+the clouds stands in `facts`.
 """
 
 from __future__ import annotations
@@ -20,8 +21,7 @@ from app.viewer.declared.work import Work, in_background
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.scene.motion import FRAME
-from app.viewer.tabs.workspace import sizes, views
-from app.viewer.tabs.workspace.axes import Axes
+from app.viewer.tabs.workspace import axes, sizes, views
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import nodes as points_of
 from app.viewer.tabs.workspace.cloud import stream
@@ -56,7 +56,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         # Apart from the other drawings: a question removes those, and it would take long to send points again.
         self._points = SceneView(stage.client.scene, self.key, self.post)
         self._clicks = Clicks(stage.client.scene, self.post)
-        self._axes = Axes(stage.client.scene)
         self._postures = self.adopt(Postures(stage, self))
         self._capability = self.adopt(Capability(stage, self, self._window, self._open_map))
         self._capability.use_look(self.settings.map, None, None)
@@ -92,11 +91,16 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
             return Html(str, key="picked")
         return Html(views.picked, (found.value, self.stage.display.units), key="picked")
 
-    def scene(self) -> Sequence[SceneNode]:
-        facts = self.facts
-        found, click, signed = facts.work("pick").value, self.settings.click, facts.work("outline").value
-        nodes = [] if found is None or click is None else [found.mark(click.size)]
-        return nodes if signed is None else [*nodes, section.outline(signed, facts.T[:3, 3], facts.q)]
+    def scene(self) -> Sequence[SceneNode | Lazy]:
+        facts, s, nodes = self.facts, self.settings, list[SceneNode | Lazy]()
+        found, signed = facts.work("pick").value, facts.work("outline").value
+        if found is not None and s.click is not None:
+            nodes.append(found.mark(s.click.size))
+        if signed is not None:
+            nodes.append(section.outline(signed, facts.T[:3, 3], facts.q))
+        if s.axes:
+            nodes.append(Lazy("axes", axes.nodes, (facts.robot, facts.units, self.stage.display.dark)))
+        return nodes
 
     def _sizes(self) -> Html:
         if not self.settings.sizes:
@@ -174,9 +178,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
 
     def refresh(self) -> None:
         super().refresh()
-        f, s, display = self.facts, self.settings, self.stage.display
+        f, s = self.facts, self.settings
         self._points.show([Lazy("clouds", points_of, (f.sheets, f.visible, s.size))])
-        self._axes.show(f.robot if s.axes else None, display.units, display.dark)
         self._clicks.listen(s.cloud is not None and s.clicks)
 
     def tick(self, now: float) -> None:
@@ -209,7 +212,6 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
     def remove(self) -> None:
         super().remove()
         self._points.remove()
-        self._axes.remove()
         self._clicks.listen(False)
 
     # Settings
@@ -279,7 +281,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
     def _fit_view(self) -> None:
         """Fit the default view to clouds, map and axes when they appear, and to the arm when they are gone."""
         clouds, mapped = self._spheres, self._capability.extent
-        corners = self._axes.corners
+        corners = self.facts.corners
         in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.arm.now.robot)
         if in_view != self.settings.in_view:
             self.change(in_view=in_view)
@@ -291,7 +293,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, WorkspaceFacts]):
         return [one.extent for one in self.facts.clouds if one.extent is not None]
 
     def extents(self) -> Sequence[Sphere]:
-        mapped, corners = self._capability.extent, self._axes.corners
+        mapped, corners = self._capability.extent, self.facts.corners
         found = [*self._spheres, *([] if mapped is None else [mapped]), *self._postures.extents()]
         return found if corners is None else [*found, round_points(corners)]
 

@@ -737,6 +737,35 @@ def test_the_box_of_the_axes_contains_the_workspace(robot):
     assert (points < high).all()
 
 
+def test_axes_follow_units_background_and_robot_and_are_in_the_picture() -> None:
+    with bare_page(PIONEER) as page:
+        page.open(Workspace)
+
+        def texts() -> set[str]:
+            return {props["text"] for _, _, props in page.scene() if "text" in props}
+
+        def inks() -> list[list[int]]:
+            return [props["colors"] for kind, _, props in page.scene() if kind == "LineSegmentsHandle"]
+
+        page.set("Axes with numbers", True)
+        page.rest()
+        assert {"x (mm)", "y (mm)", "z (mm)", "0"} <= texts()
+        assert np.array_equal(page.views[-1][1], axes.corners_of(PIONEER))
+        light = inks()
+        page.dark = True
+        page.style(Units(length="cm"))
+        assert not any("(mm)" in text for text in texts())
+        assert {"x (cm)", "y (cm)", "z (cm)"} <= texts()
+        assert len(light) == len(inks()) == 1
+        assert light != inks()
+        page.change(PUMA)
+        assert np.array_equal(page.views[-1][1], axes.corners_of(PUMA))
+        page.set("Axes with numbers", False)
+        page.rest()
+        assert not texts()
+        assert page.views[-1][1] is None
+
+
 def test_two_arms_in_one_scene_have_different_colours(tab):
     tab.draw(N, seed=19)
     tab.set("Compare with", PUMA.name)
