@@ -66,13 +66,13 @@ class Sending:
         self.loop, self.line = loop, Line()
         self.wakes = 0
         self.waker = LoopWaker(loop)
-        answer_all = self.waker._answer
+        wake: Any = loop.call_soon_threadsafe
 
-        def answer() -> None:
+        def counted(*args: Any) -> Any:
             self.wakes += 1
-            answer_all()
+            return wake(*args)
 
-        self.waker._answer = answer  # type: ignore[method-assign]
+        loop.call_soon_threadsafe = counted  # type: ignore[method-assign]
         self.box = Outbox(7, self.waker, Packer())
         connection: Any = self.line
         self.sent = asyncio.run_coroutine_threadsafe(self.box.send_to(connection), loop)

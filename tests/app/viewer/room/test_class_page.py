@@ -769,25 +769,30 @@ def pressed(line: Line) -> list[str]:
     return [reply.pressed for reply in line.replies() if reply.pressed]
 
 
+def presses_before(line: Line, moved: Callable[[Any], bool]) -> list[bool]:
+    """Whether the program is to hear of a button, each time that it hears of joints that `moved` names."""
+    found, publish = list[bool](), line.publish
+
+    def published(name: str, value: Any, anew: bool = True) -> None:
+        if name == "q" and moved(value):
+            found.append(bool(line._replies))
+        publish(name, value, anew)
+
+    line.publish = published  # type: ignore[method-assign]
+    return found
+
+
 @pytest.mark.full
 def test_a_real_arm_is_stopped_before_the_page_follows_the_teacher(room: Class, lines: list[Line]) -> None:
     teacher, (student, _) = room.teacher(), room.join("Ann")
     line = drive(student, lines, STOP)
-    moved_first: list[bool] = []
-    publish = line.publish
-
-    def published(name: str, value: Any, anew: bool = True) -> None:
-        if name == "q" and value[0] != ROBOT.q_home[0]:
-            moved_first.append(not line._replies)
-        publish(name, value, anew)
-
-    line.publish = published  # type: ignore[method-assign]
+    pressed_first = presses_before(line, lambda q: q[0] != ROBOT.q_home[0])
     teacher.set("1 rotating base", 30.0)
     press(teacher, "follow")
     mode(student, "led")
     student.wait(lambda: "Stopped: the class follows its teacher." in student.html)
-    student.wait(lambda: bool(moved_first))
-    assert moved_first[0] is False, "the press is sent before the first joint of the teacher"
+    student.wait(lambda: bool(pressed_first))
+    assert pressed_first[0], "the press is sent before the first joint of the teacher"
     assert pressed(line) == ["stop"]
     line.send({"drives": None, "announce": Announcement("It holds its place.", "stopped", (STOP,))})
     student.wait(lambda: "Stopped: the class follows its teacher. <bdi>It holds its place." in student.html)
@@ -845,20 +850,13 @@ def test_the_teachers_own_arm_is_stopped_before_the_page_goes_back_to_where_it_w
     there[0] += 0.6
     first, last = (kin.motion.Ptp(kin.motion.JointTarget(q)) for q in (ROBOT.q_home, there))
     line.send({"program": kin.motion.Program((first, last)), "play": True})
-    teacher.wait(lambda: line._values["q"][1][0] > ROBOT.q_home[0] + 0.01)
+    begun = teacher.value("1 rotating base")
+    teacher.wait(lambda: teacher.value("1 rotating base") > begun + 0.6)
     press(teacher, "wall")
     teacher.wait(lambda: "data-class-wall" in teacher.html)
-    teacher.wait(lambda: np.allclose(line._values["q"][1], there, atol=1e-4))
+    teacher.wait(lambda: teacher.value("1 rotating base") == pytest.approx(np.degrees(there[0]), abs=0.01))
     assert pressed(line) == [], "the wall is beside the arm"
-    pressed_first: list[bool] = []
-    publish = line.publish
-
-    def published(name: str, value: Any, anew: bool = True) -> None:
-        if name == "q" and not np.allclose(value, there, atol=1e-4):
-            pressed_first.append(bool(line._replies))
-        publish(name, value, anew)
-
-    line.publish = published  # type: ignore[method-assign]
+    pressed_first = presses_before(line, lambda q: not np.allclose(q, there, atol=1e-4))
     press(teacher, "wall")
     teacher.wait(lambda: "Stopped: this page goes back to where its own arm was." in teacher.html)
     teacher.wait(lambda: bool(pressed_first))
