@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 PIECE: Final = 4096  # bytes parsed before frames are counted
 MAX_WAITING: Final = 4096  # messages that are parsed and not read; those of pages are longer than 64 bytes
-AHEAD: Final = 8  # messages that are read while the first waits
+AHEAD: Final = 8  # messages of at most a piece that may wait before the next ones are left unread
 MAX_FRAGMENTS: Final = 64  # of one message
 PING_RATE, PING_BURST = 30.0, 60.0  # pings and pongs of a client in a second, and at once
 LIVE_PING: Final = 2.0  # s between two of ours to a page's program: the page shows how long an answer takes
@@ -104,7 +104,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         except UnicodeDecodeError:
             self._end(CloseCode.INVALID_DATA, "a text message that is not UTF-8")
             return
-        if self.read_paused or self.queue.qsize() >= AHEAD:
+        long = sum(map(len, self.frames)) > PIECE  # several of these would take megabytes
+        if self.read_paused or long or self.queue.qsize() >= AHEAD:
             super().send_receive_event_to_app()
         else:
             # uvicorn stops reading at each message until it is taken: two system calls for every event of a drag.

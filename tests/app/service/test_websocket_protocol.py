@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from app.service.websocket_protocol import AHEAD, WebSocketProtocol
+from app.service.websocket_protocol import AHEAD, PIECE, WebSocketProtocol
 
 
 class Line:
@@ -43,6 +43,18 @@ def test_a_few_messages_are_read_ahead_and_no_more() -> None:
     assert not protocol.transport.reads
     arrive(protocol, "text", b"y")  # came in the same piece
     assert protocol.transport.stops == 1
+
+
+def test_nothing_is_read_after_a_long_message() -> None:
+    protocol = connected()
+    arrive(protocol, "bytes", bytes(PIECE))
+    assert protocol.transport.reads
+    arrive(protocol, "bytes", bytes(PIECE + 1))
+    assert not protocol.transport.reads
+    protocol = connected()
+    protocol.curr_msg_data_type, protocol.frames = "text", [bytes(PIECE), b"x"]
+    protocol.send_receive_event_to_app()
+    assert not protocol.transport.reads, "its fragments count together"
 
 
 def test_it_is_read_again_when_all_that_waited_is_taken() -> None:
