@@ -22,6 +22,7 @@ from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
 from app.shared.memory.answers import AnswerMemory
 from app.shared.slots import Slot, Slots
+from app.shared.threads import in_short_turns
 
 T = TypeVar("T")
 RETRY_AFTER = 2  # seconds
@@ -261,7 +262,8 @@ async def computed_here(
     def timed() -> T:
         began = time.perf_counter()
         try:
-            return answer(deadline)
+            with in_short_turns():
+                return answer(deadline)
         finally:
             if took is not None:
                 took(time.perf_counter() - began)

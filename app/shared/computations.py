@@ -17,6 +17,8 @@ from concurrent.futures import CancelledError, Executor, Future
 from types import TracebackType
 from typing import Generic, TypeVar
 
+from app.shared.threads import in_short_turns
+
 T = TypeVar("T")
 
 
@@ -203,7 +205,8 @@ class ComputationCache(Generic[T]):
         if not computation.future.set_running_or_notify_cancel():
             return
         try:
-            result = compute(computation)
+            with in_short_turns():
+                result = compute(computation)
             size = self._size_of(result)
         except BaseException as error:  # noqa: BLE001 - every caller raises it
             with self._lock:

@@ -9,9 +9,11 @@ import os
 import sys
 import threading
 import weakref
+from collections.abc import Iterator
 from typing import NoReturn
 
 NICENESS = 10  # of threads that compute in the background
+SHORT_TURN = 5e-4  # s for which a thread keeps the interpreter while something is computed beside visitors
 
 
 def processors() -> int:
@@ -31,6 +33,34 @@ def lower_priority() -> None:
         thread = threading.get_native_id()
         own = os.getpriority(os.PRIO_PROCESS, thread)  # who started the process may have lowered it farther
         os.setpriority(os.PRIO_PROCESS, thread, max(own, NICENESS))
+
+
+_counting = threading.Lock()
+_computing = 0  # threads within `in_short_turns`
+_usual_turn = 0.0  # s, before the first of them
+
+
+@contextlib.contextmanager
+def in_short_turns() -> Iterator[None]:
+    """While this lasts, threads take the interpreter from each other after `SHORT_TURN`.
+
+    The event loop gives it away with each read and write, and a thread that computes in Python would keep it for
+    Python's usual 5 ms each time: thirty visitors who drag while equations are derived then wait 0.11 s for half
+    of their pictures, and here 0.05 to 0.07 s. Where nothing is computed, the usual turns cost least.
+    """
+    global _computing, _usual_turn
+    with _counting:
+        if _computing == 0:
+            _usual_turn = sys.getswitchinterval()
+            sys.setswitchinterval(min(SHORT_TURN, _usual_turn))
+        _computing += 1
+    try:
+        yield
+    finally:
+        with _counting:
+            _computing -= 1
+            if _computing == 0:
+                sys.setswitchinterval(_usual_turn)
 
 
 def end_process(code: int) -> NoReturn:

@@ -12,7 +12,7 @@ from typing import Final
 
 from app.live.recording import Bounds, Recording, read
 from app.shared.memory.answers import Reservation
-from app.shared.threads import lower_priority
+from app.shared.threads import in_short_turns, lower_priority
 from app.viewer.feature import Stage
 from app.viewer.meshes.incoming import Awaited, IncomingFile
 from app.viewer.panel import Post
@@ -81,6 +81,7 @@ class Opening:
 
 def _read(data: bytes, robot: Robot, bounds: Bounds, room: Reservation) -> Recording:
     try:
-        return read(data, robot, bounds)
+        with in_short_turns():
+            return read(data, robot, bounds)
     finally:
         room.release()
