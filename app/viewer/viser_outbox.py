@@ -93,6 +93,7 @@ class LoopWaker:
             try:
                 self.loop.call_soon_threadsafe(self._answer)
             except RuntimeError:
+                self._woken = False  # so that the next step does not wait either
                 return False
         return True
 
