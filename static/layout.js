@@ -196,12 +196,7 @@
     for (const button of dom.all("[data-text-size]")) dom.set(button, "ariaPressed", String(button.dataset.textSize === size));
   }
 
-  dom.on("click", "[data-text-size]", (button) => {
-    const before = root.dataset.kbText;
-    chooseSize(button.dataset.textSize);
-    // Who may only look can tell the service the size of labels only while the page opens; the view stays.
-    if (document.querySelector("[data-looking]") && root.dataset.kbText !== before) location.reload();
-  });
+  dom.on("click", "[data-text-size]", (button) => chooseSize(button.dataset.textSize));
 
   /** Make the panel's edge a control for the keyboard too. */
   function markEdge() {

@@ -3,8 +3,8 @@
 `Rights` decides for REST, both websockets of a page and what a link restores. Holders of the access token have
 full access; without a token everybody has it, unless the service is read-only. The one exception: exercises are
 saved on the service only by holders of the token or, without one, by browsers on the same machine. A read-only
-visitor may read pages and robots, and see the arm of a link from all sides, in the colours of their system.
-Nothing is moved, solved, sampled or mapped for a read-only visitor.
+visitor may read pages and robots, and see the arm of a link from all sides, in the colours of their system and
+with texts of the size that they choose. Nothing is moved, solved, sampled or mapped for a read-only visitor.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
@@ -34,6 +34,7 @@ CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
 HELLO = "hello"  # in the page's channel: what it remembers
 SYSTEM_DARK = "system-dark"  # there too: whether the visitor's system is dark now
+TEXT_SIZE = "text-size"  # there too: of the labels in the visitor's scene
 
 # Of a page and its first websocket, of its channel, of its files: below the prefix of the service.
 PAGE, CHANNEL, UPLOAD = "/viewer", "/viewer/channel", "/viewer/upload"
@@ -64,7 +65,7 @@ class Rights(Enum):
         Args:
             kind: its kind in viser's protocol, or its name in the page's channel.
         """
-        return self.compute or kind in (CAMERA, MEMORY, HELLO, SYSTEM_DARK)
+        return self.compute or kind in (CAMERA, MEMORY, HELLO, SYSTEM_DARK, TEXT_SIZE)
 
     @property
     def compute(self) -> bool:

@@ -88,16 +88,21 @@ def test_the_page_follows_the_colours_of_the_system(tab: Tab) -> None:
 
 
 @pytest.mark.full
-def test_a_page_that_may_only_look_follows_the_colours_of_the_system(
+def test_a_page_that_may_only_look_follows_the_colours_of_the_system_and_the_size_of_the_text(
     browser: Browser, read_only_address: str
 ) -> None:
     page = browser.new_page(color_scheme="light")
     page.add_init_script(BLIND)
     page.goto(read_only_address + "viewer/")
     expect(page.locator("[data-looking]")).to_be_attached(timeout=WAIT)
+    page.evaluate("window.kbStays = true")
+    page.get_by_role("tab", name="View").click()
+    page.get_by_role("button", name="Projector").click()
+    expect(page.locator("html")).to_have_attribute("data-kb-text", "Projector")
     for scheme in ("dark", "light"):
         page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
         expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", scheme)
+    assert page.evaluate("window.kbStays"), "it is the same page, not loaded again"
     page.close()
 
 

@@ -340,6 +340,8 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             assert "You may look" in tab.html
             assert "data-hints" not in tab.html, "no hint asks to drag what cannot be dragged"
             assert tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.7)
+            tab.say("text-size", "Large")
+            tab.wait(lambda: tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.3))
             before = tab.tool_pose()
             assert not tab.commands, "nor does the palette offer anything"
             tab.send("CommandTriggerMessage", uuid="guessed")
@@ -413,7 +415,7 @@ def test_the_rights_of_a_visitor_who_may_only_look():
     assert not look.allow_websocket("/api/v1/robots/pioneer5/workspace/stream")
     known = {kind for kind in ALLOWED if look.allow_message(kind)}
     assert known == {"ViewerCameraMessage", "LocalStorageGetItemResponseMessage"}
-    assert [name for name in MESSAGES if look.allow_message(name)] == ["system-dark"]
+    assert [name for name in MESSAGES if look.allow_message(name)] == ["text-size", "system-dark"]
     assert all(map(full.allow_message, MESSAGES))
 
 

@@ -15,7 +15,7 @@ import pytest
 from viser._messages import LocalStorageGetItemResponseMessage
 
 from app.shared.connection import ConnectionEnded
-from app.shared.security import SYSTEM_DARK, Rights
+from app.shared.security import SYSTEM_DARK, TEXT_SIZE, Rights
 from app.viewer.panel.script import Reply
 from app.viewer.session.channel import channel as module
 from app.viewer.session.channel.channel import MAY_LOOK, REPLACED, WAITING, Channel
@@ -213,12 +213,15 @@ def test_who_may_only_look_is_answered_and_changes_nothing(door: str) -> None:
         await rest()
         replies = [value for _, _, value in line.notices]
         assert replies == [[number, MAY_LOOK, []] for number in range(1, len(acts) + 1)]
-        line.say(len(acts) + 1, SYSTEM_DARK, True)
+        for number, name in enumerate(looks, len(acts) + 1):
+            line.say(number, name, "value")
         await rest()
 
-    acts = [name for name in MESSAGES if name != SYSTEM_DARK]
+    looks = [SYSTEM_DARK, TEXT_SIZE]
+    acts = [name for name in MESSAGES if name not in looks]
     posted = run(play, looking if door == "page" else Rights.FULL).posted
-    assert posted == [(("message", SYSTEM_DARK, len(MESSAGES)), True)], "the colours of the system change nothing"
+    passed = [(("message", name, number), "value") for number, name in enumerate(looks, len(acts) + 1)]
+    assert posted == passed, "colours and sizes change nothing of the arm"
 
 
 def test_what_a_page_remembers_comes_first_and_counts_once_whatever_its_rights() -> None:
