@@ -144,6 +144,7 @@
       PageUp: from + field.page, PageDown: from - field.page, Home: least, End: most,
     }[event.key];
     if (to === undefined) return false;
+    if (!channel.mayAct()) return true; // no slider shows what the arm does not
     const value = Math.round(Math.min(Math.max(to, least), most) * DECIMALS) / DECIMALS;
     last = { id, value, at: now };
     const input = viserPage.fieldOf(id);
@@ -169,7 +170,7 @@
   // History
 
   function historyKey(event) {
-    if (!(event.ctrlKey || event.metaKey) || event.altKey) return false;
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || !channel.mayAct()) return false;
     const key = event.key.toLowerCase();
     if (key !== "z" && (key !== "y" || event.shiftKey)) return false;
     send(key === "y" || event.shiftKey ? "redo" : "undo");
@@ -188,7 +189,7 @@
 
   function openForm(kind) {
     const box = form();
-    if (!box) return;
+    if (!box || !channel.mayAct()) return;
     if (!box.hidden) mark(false); // opened by another button
     box.hidden = false;
     box.dataset.typed = kind;
@@ -317,7 +318,7 @@
 
   /** A key pressed while no control has the focus. */
   function sceneKey(event) {
-    if (event.ctrlKey || event.metaKey || viserPage.isControl(event.target)) return false;
+    if (event.ctrlKey || event.metaKey || viserPage.isControl(event.target) || !channel.mayAct()) return false;
     const move = MOVES[event.code];
     if (move) send("nudge", [move[0], event.altKey, move[1], event.shiftKey]);
     else if (event.altKey || event.shiftKey || event.repeat) return false;

@@ -30,7 +30,7 @@
   const drawn = (keys) => keys.split(/( )/).map((word) => dom.element("span", {}, ...word.split(CAP).map(cap)));
   for (const cell of dom.all("th", overview)) cell.replaceChildren(...drawn(cell.textContent));
   function open() {
-    overview.toggleAttribute("data-only-looking", document.querySelector("[data-looking]") !== null);
+    overview.toggleAttribute("data-only-looking", !channel.mayAct());
     overview.showModal();
   }
   on("click", "[data-keys-open]", open);

@@ -289,6 +289,30 @@ def test_who_may_only_look_sees_the_keys_that_work_then(browser: Browser, read_o
 
 
 @pytest.mark.full
+def test_keys_that_act_do_nothing_where_one_may_only_look(browser: Browser, read_only_address: str) -> None:
+    page = browser.new_page()
+    page.add_init_script(BLIND)
+    page.goto(read_only_address + "viewer/")
+    expect(page.locator("[data-looking]")).to_be_attached(timeout=WAIT)
+    slider = page.get_by_role("slider", name="2 rotating elbow")
+    before = slider.get_attribute("aria-valuenow")
+    assert before is not None
+    page.evaluate("window.kbSent = 0; channel.watchSent(() => { window.kbSent++; });")
+    for key in ("Control+z", "Control+y", "Control+k", "j", "Shift+l", "Alt+i", "g", "t"):
+        page.keyboard.press(key)
+    for key in ("ArrowRight", "Shift+ArrowUp", "PageUp", "Home", "End"):
+        slider.press(key)
+    page.locator(".kb-field input:visible").nth(1).press("PageDown")
+    page.locator("tr[data-type=position]").click()
+    expect(page.locator("[data-typed] textarea")).to_be_hidden()
+    expect(page.get_by_role("button", name="Type a target")).to_be_hidden()
+    page.wait_for_timeout(700)  # a key on a slider is let go after 600 ms
+    assert page.evaluate("window.kbSent") == 0
+    expect(slider).to_have_attribute("aria-valuenow", before)
+    page.close()
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("mode", ["1", "panel"])
 def test_within_another_page_the_keys_that_work_are_listed(browser: Browser, address: str, mode: str) -> None:
     page, panel = browser.new_page(), mode == "panel"
