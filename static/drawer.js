@@ -53,7 +53,7 @@
   addEventListener("keydown", (event) => {
     if (event.code !== "KeyB" || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || event.repeat) return;
     const typing = event.target.matches("input:not([type=checkbox], [type=radio], [type=range]), textarea, select, [contenteditable]");
-    if (typing || !parts().length) return;
+    if (typing || SMALL.matches || !parts().length) return;
     event.preventDefault();
     toggle();
   });

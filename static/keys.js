@@ -2,7 +2,8 @@
 // Runs in viser's page: what the keys do, as an overview (static/viewer.html) that the key ? and a button in the tab View
 // open. There, keys of a single letter can also be switched off, for those who speak to their computer or press keys by
 // accident. The choice is kept in this browser. A row with data-acts is not for those who may only look.
-// Within another page (?embed=…), what has data-whole is not there, and what has data-panel only beside a panel.
+// Within another page (?embed=…), what has data-whole is not there, and what has data-panel only beside a panel. What has
+// data-drawer is not there in a small window (drawer.css).
 //
 // docs/teaching.md and docs/own-arm.md have the same list, which a test compares; input.js, drawer.js and robot.js act.
 (() => {

@@ -68,6 +68,31 @@ def test_the_whole_table_is_seen_below_the_scene_and_typed_into(desktop: Tab) ->
     tab.select(PIONEER)
 
 
+@pytest.mark.parametrize(("width", "height"), [(570, 720), (1280, 470)])
+def test_in_a_small_window_there_is_no_drawer_and_no_key_for_it(desktop: Tab, width: int, height: int) -> None:
+    page, keys = desktop.page, desktop.page.get_by_role("dialog", name="Keys")
+    row = keys.get_by_role("row", name="B tabs Robot and Program")
+
+    def assert_listed(listed: bool) -> None:
+        page.locator("body").press("?")
+        expect(keys).to_be_visible()
+        expect(row).to_be_visible(visible=listed)
+        page.keyboard.press("Escape")
+        expect(keys).to_be_hidden()
+
+    desktop.open("Robot")
+    assert_listed(True)
+    with desktop.sized(width, height):
+        desktop.open("Robot")
+        expect(page.locator("[data-arm=table]")).to_be_visible()
+        page.locator("body").press("b")
+        assert_listed(False)
+    desktop.open("Robot")
+    expect(page.locator("[data-arm=table] [data-wide-do]")).to_be_visible()
+    page.wait_for_function(f"{BOTTOM} > 719")
+    expect(page.locator("html")).not_to_have_attribute("data-kb-drawer", "")
+
+
 def test_rows_and_plot_of_a_program_stand_side_by_side(desktop: Tab) -> None:
     tab, page = desktop, desktop.page
     for i, button in enumerate(("Home", "Random")):
