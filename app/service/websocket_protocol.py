@@ -59,7 +59,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                 self._end(CloseCode.POLICY_VIOLATION, f"more than {MAX_WAITING} messages at once")
 
     def handle_connect(self, event: Request) -> None:
-        if LIVE in event.path:
+        if LIVE in event.path.partition("?")[0]:
             self.conn.max_message_size = MAX_LIVE
             self.ping_interval = min(LIVE_PING, self.ping_interval or LIVE_PING)
         super().handle_connect(event)

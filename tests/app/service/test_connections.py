@@ -364,7 +364,7 @@ def test_a_flood_of_frames_is_not_read(service, flood, path):
         assert service.answers_after() < 10
 
 
-@pytest.mark.parametrize("path", ["/viewer", LONG_STREAM])
+@pytest.mark.parametrize("path", ["/viewer", "/viewer?not=/api/v1/live/", LONG_STREAM])
 @pytest.mark.parametrize(
     ("sent", "code"),
     [
@@ -373,8 +373,9 @@ def test_a_flood_of_frames_is_not_read(service, flood, path):
         (frame(3, b"x"), 1002),
         (frame(0, b"x"), 1002),
         (bytes([0x82, 0xFF]) + b"\x7f" * 8 + bytes(4), 1009),
+        (bytes([0x82, 0xFF]) + (1 << 20).to_bytes(8, "big") + bytes(4), 1009),
     ],
-    ids=["not UTF-8", "not UTF-8 in parts", "unknown", "out of order", "huge"],
+    ids=["not UTF-8", "not UTF-8 in parts", "unknown", "out of order", "huge", "of a program's size"],
 )
 def test_a_malformed_message_ends_the_connection(service, path, sent, code):
     """And nothing else: the log has no traceback at the end of these tests."""
