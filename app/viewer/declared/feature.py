@@ -336,7 +336,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def tick(self, now: float) -> None:
         self.for_parts(lambda part: None if part.due is None else part.tick(now))
-        early = self._due_at is not None and self._due_at > now
+        early = self._due_at is not None and self._due_at > max(now, time.perf_counter())
         if early and not self._stale and self.settings is self.read.settings:
             return  # called after a step of something else
         self.due, again = None, None
