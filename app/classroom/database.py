@@ -18,6 +18,7 @@ import os
 import secrets
 import sqlite3
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -252,8 +253,26 @@ class Database:
 
 def _configure_sqlite(connection: Any, _: object) -> None:
     connection.isolation_level = None  # transactions begin where `_begin_sqlite` says
-    for pragma in ("journal_mode=WAL", "foreign_keys=ON", "secure_delete=ON", "journal_size_limit=4000000"):
+    _write_ahead(connection)
+    for pragma in ("foreign_keys=ON", "secure_delete=ON", "journal_size_limit=4000000"):
         connection.execute(f"PRAGMA {pragma}")
+
+
+def _write_ahead(connection: Any) -> None:
+    """Have SQLite write ahead; of processes that open a new file at the same time, one does it for all.
+
+    SQLite refuses the others at once, without the wait that it makes for every other lock: both hold the file
+    for reading, and each would wait for the other.
+    """
+    end = steady() + WAIT
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or steady() > end:
+                raise
+        time.sleep(0.01)
 
 
 def _begin_sqlite(connection: Connection) -> None:

@@ -35,14 +35,24 @@ class DragEvent(NamedTuple):
 
 
 def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> None:
-    """Post a `DragEvent`: ``"grab"`` when the gizmo is grabbed, ``"gizmo"`` when it is dragged or released."""
+    """Post a `DragEvent`: ``"grab"`` when the gizmo is grabbed, ``"gizmo"`` when it is dragged or released.
+
+    It is released where it was dragged last: viser's message of the release has no pose, and a step that began
+    before the drag may have placed the handle since.
+    """
+    last: tuple[list[float], list[float]] | None = None
 
     @handle.on_update
     async def _(event: viser.TransformControlsEvent) -> None:
+        nonlocal last
         if event.client is not None:
             gizmo = event.target
+            pose = gizmo.position.tolist(), gizmo.wxyz.tolist()
+            if event.phase == "end":
+                pose = last or pose
+            last = pose if event.phase == "update" else None
             key = "grab" if event.phase == "start" else "gizmo"  # the next event must not replace the start
-            post(key, DragEvent(event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
+            post(key, DragEvent(event.phase, *pose, ring))
 
 
 def travel(start: Array, T: Array, units: Units) -> str:

@@ -537,6 +537,22 @@ def test_processes_that_start_at_the_same_time_migrate_once(tmp_path):
         hub.close()
 
 
+def test_a_process_waits_while_another_makes_the_same_new_database(tmp_path):
+    """SQLite refuses this lock at once, whatever the time that it may wait for others."""
+    (tmp_path / "data").mkdir()
+    maker = sqlite3.connect(tmp_path / "data" / "classroom.db", isolation_level=None, check_same_thread=False)
+    maker.execute("BEGIN IMMEDIATE")
+    end = threading.Timer(0.3, maker.rollback)
+    end.start()
+    hub = Hub(tmp_path / "data")
+    try:
+        assert hub.rooms.open("Kinematics", 3600).title == "Kinematics"
+    finally:
+        end.join()
+        hub.close()
+        maker.close()
+
+
 def test_a_missing_driver_is_said(tmp_path, monkeypatch, caplog):
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with pytest.raises(ClassroomUnavailable, match="cannot be reached"):

@@ -20,6 +20,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.panel.joints import label
+from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.clearance import clearance
 from app.viewer.server import ViewerServer
 
@@ -169,10 +170,15 @@ def test_the_five_joint_arm_names_the_roll_it_gives_up_and_the_task_can_be_relax
         assert np.allclose(tab.gizmo_pose(), tab.tool_pose(), atol=1e-9), "a reached target is where the tool is"
 
 
-def test_a_limit_is_named_by_joint_number(port: int) -> None:
+def past_joint_4() -> np.ndarray:
+    """The tool pose of a Pioneer at home, but for joint 4, which is past its stop."""
     q = PIONEER.q_home.copy()
-    q[3] = math.radians(-20)  # past the stop of joint 4
-    T = kin.fk(PIONEER, q)
+    q[3] = math.radians(-20)
+    return kin.fk(PIONEER, q)
+
+
+def test_a_limit_is_named_by_joint_number(port: int) -> None:
+    T = past_joint_4()
     expected = kin.solve_ik(PIONEER, T, task="approach", q_seed=PIONEER.q_home)
     assert expected.status == kin.Status.LIMITS
     with FakeBrowser(port) as tab:
@@ -183,6 +189,60 @@ def test_a_limit_is_named_by_joint_number(port: int) -> None:
         tab.release()
         tab.wait(lambda: 'data-status="limits"' in tab.html)
         assert f"Outside the limits: joint {expected.violations[0].joint + 1}" in tab.html
+
+
+def test_the_gizmo_is_released_where_it_was_dragged(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that began before the drag may place the gizmo between the drag and the release."""
+    begun, go_on, placed = (threading.Event() for _ in range(3))
+    place = ArmScene.place_gizmo
+
+    def late(*args: Any, **options: Any) -> None:
+        begun.set()
+        assert go_on.wait(10.0)
+        place(*args, **options)
+        placed.set()
+
+    T = kin.fk(PIONEER, np.array([0.3, 0.4, -0.5, 0.2, 0.1]))
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        monkeypatch.setattr(ArmScene, "place_gizmo", late)
+        tab.set("Target must match", "Point + approach")
+        assert begun.wait(10.0)
+        tab.grab()
+        tab.drag(T)
+        tab.answer()
+        go_on.set()
+        assert placed.wait(10.0)
+        tab.release()
+        tab.wait(lambda: 'data-status="reached"' in tab.html)
+        arrives(tab, T, 1e-3)
+
+
+def test_the_gizmo_is_released_where_it_was_dragged(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that began before the drag may place the gizmo between the drag and the release."""
+    begun, go_on, placed = (threading.Event() for _ in range(3))
+    place = ArmScene.place_gizmo
+
+    def late(scene: ArmScene, T_base_tool: np.ndarray, again: bool = False) -> None:
+        begun.set()
+        assert go_on.wait(10.0)
+        place(scene, T_base_tool, again)
+        placed.set()
+
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        monkeypatch.setattr(ArmScene, "place_gizmo", late)
+        tab.set("Target must match", "Point + approach")
+        assert begun.wait(10.0)
+        tab.grab()
+        tab.drag(past_joint_4())
+        tab.viser.wait_until_handled()
+        go_on.set()
+        assert placed.wait(10.0)
+        tab.release()
+        tab.wait(lambda: 'data-status="limits"' in tab.html)
+        tab.settle()
+        assert 'data-status="limits"' in tab.html
 
 
 def test_an_open_lesson_is_kept_for_the_next_page_of_the_browser(port: int) -> None:
