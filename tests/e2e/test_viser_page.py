@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+import time
 
 import pytest
 from page import DrawnTab, Tab
-from playwright.sync_api import Browser, ConsoleMessage, expect
+from playwright.sync_api import Browser, ConsoleMessage, Route, expect
 
 import kin
 
@@ -254,9 +255,38 @@ TAKEN = {
 }
 
 
+SLOW_TO_UNPACK = """
+const compile = WebAssembly.instantiate;
+WebAssembly.instantiate = async (...given) => {
+  await new Promise((done) => setTimeout(done, 700));
+  return compile(...given);
+};
+"""
+
+
 def test_this_version_of_viser_lacks_nothing(desktop: Tab) -> None:
     assert desktop.page.evaluate("viserPage.lacks()") == []
     expect(desktop.page.locator("#kb-lacks")).to_have_count(0)
+
+
+def test_scripts_that_come_late_still_run_before_viser_s(browser: Browser, address: str) -> None:
+    """viser's script unpacks itself and starts once the page is read, with whatever address the page has then."""
+
+    class SlowToUnpack(Tab):
+        scripts = Tab.scripts + SLOW_TO_UNPACK
+
+    def late(route: Route) -> None:
+        time.sleep(1.5)
+        route.continue_()
+
+    tab = SlowToUnpack(browser, address, 1280, 720)
+    tab.open("Program")
+    tab.page.wait_for_function("location.hash.includes('tab=Program')")
+    tab.page.route("**/static/channel.js", late)
+    tab.page.reload()
+    expect(tab.page.get_by_role("tab", name="Program", exact=True)).to_have_attribute("aria-selected", "true")
+    assert tab.page.evaluate("viserPage.lacks()") == []
+    tab.close()
 
 
 @pytest.mark.full

@@ -102,13 +102,16 @@ _SCRIPTS = (
     b"describe",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints", b"keys")
-# Scripts run when the page is read, and before that of viser, which waits for that too; the first one runs at
-# once, and says so if another one fails. Styles come after those of viser, which its script puts into the head.
-_OURS = b"".join(
+# The first script runs at once, and says so if another one fails. The others stand at the end of the body, which
+# they use, and are only announced in the head. They have no `defer`: viser's script unpacks itself and starts as
+# soon as the page is read, before scripts that are put off and come late. Styles come after those of viser, which
+# its script puts into the head.
+_HEAD = b"".join(
     [b'<link rel="stylesheet" href="../static/start.css"><script src="../static/start.js"></script>']
-    + [b'<script defer src="../static/%s.js"></script>' % name for name in _SCRIPTS]
+    + [b'<link rel="preload" as="script" href="../static/%s.js">' % name for name in _SCRIPTS]
 )
 _OUR_STYLES = b"".join(b'<link rel="stylesheet" href="../static/%s.css">' % name for name in _STYLES)
+_OUR_SCRIPTS = b"".join(b'<script src="../static/%s.js"></script>' % name for name in _SCRIPTS)
 
 
 class ViewerBridge:
@@ -340,10 +343,9 @@ class _Page:
         html = html.replace(b"<title>Viser</title>", b"<title>Kinboard viewer</title>", 1)
         # A menu that opens beside a phone's screen must not widen the page.
         html = html.replace(b"initial-scale=1", b"initial-scale=1, minimum-scale=1", 1)
-        # Must come before viser's own script.
-        html = html.replace(b"<head>", b"<head>" + _OURS + link.encode(), 1)
+        html = html.replace(b"<head>", b"<head>" + _HEAD + link.encode(), 1)
         beside = (static_folder() / "viewer.html").read_bytes()
-        self._html = html.replace(b"</body>", _OUR_STYLES + beside + b"</body>", 1)
+        self._html = html.replace(b"</body>", _OUR_STYLES + beside + _OUR_SCRIPTS + b"</body>", 1)
         self._gzipped = gzip.compress(self._html, 6)
         self._headers = {
             "content-security-policy": VIEWER_POLICY,

@@ -196,33 +196,6 @@ def test_the_gizmo_is_released_where_it_was_dragged(port: int, monkeypatch: pyte
     begun, go_on, placed = (threading.Event() for _ in range(3))
     place = ArmScene.place_gizmo
 
-    def late(*args: Any, **options: Any) -> None:
-        begun.set()
-        assert go_on.wait(10.0)
-        place(*args, **options)
-        placed.set()
-
-    T = kin.fk(PIONEER, np.array([0.3, 0.4, -0.5, 0.2, 0.1]))
-    with FakeBrowser(port) as tab:
-        tab.settle()
-        monkeypatch.setattr(ArmScene, "place_gizmo", late)
-        tab.set("Target must match", "Point + approach")
-        assert begun.wait(10.0)
-        tab.grab()
-        tab.drag(T)
-        tab.answer()
-        go_on.set()
-        assert placed.wait(10.0)
-        tab.release()
-        tab.wait(lambda: 'data-status="reached"' in tab.html)
-        arrives(tab, T, 1e-3)
-
-
-def test_the_gizmo_is_released_where_it_was_dragged(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step that began before the drag may place the gizmo between the drag and the release."""
-    begun, go_on, placed = (threading.Event() for _ in range(3))
-    place = ArmScene.place_gizmo
-
     def late(scene: ArmScene, T_base_tool: np.ndarray, again: bool = False) -> None:
         begun.set()
         assert go_on.wait(10.0)
