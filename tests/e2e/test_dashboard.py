@@ -20,13 +20,15 @@ pytestmark = pytest.mark.browser
 
 TYPE_SLOWLY = """texts => new Promise(done => {
     const sent = [], cell = document.querySelector('[data-arm] input[data-cell="tool z"]');
-    const { send } = channel;
-    channel.send = (...message) => {
-        if (message[1]?.[1]?.[0] === "cell") {
-            sent.push(message[1][2][1]);
-            setTimeout(() => { channel.send = send; done(sent); }, 500);
+    cell.focus();
+    const { send } = WebSocket.prototype;
+    WebSocket.prototype.send = function (text) {
+        const [, name, argument] = JSON.parse(text);
+        if (name === "feature" && argument[1][0] === "cell") {
+            sent.push(argument[2][1]);
+            setTimeout(() => { WebSocket.prototype.send = send; done(sent); }, 500);
         }
-        return send(...message);
+        return send.call(this, text);
     };
     texts.forEach((text, i) => setTimeout(() => {
         cell.value = text;
@@ -161,6 +163,8 @@ def test_a_zip_or_several_files_show_the_real_arm_and_delete_removes_it(tab: Tab
     expect(page.locator('[data-arm="files"]')).to_contain_text("stay while this page is open")
     tab.wait_for_tool(kin.fk(two, two.q_home)[:3, 3], within=0.06)
     tab.screenshot("meshes")
+    tab.rest()
+    expect(page.locator('[data-arm] input[data-cell="tool z"]')).to_be_visible()
     sent = page.evaluate(TYPE_SLOWLY, ["0", "1", "10", "100"])
     assert sent == ["100"], "an arm with meshes is sent once typing rests"
     page.get_by_role("button", name="Delete my arm").click()

@@ -366,6 +366,7 @@ def test_tabs_arms_and_lessons_are_found_by_typing(tab: Tab) -> None:
             tab.screenshot("palette")
         tab.page.keyboard.press("Enter")
         expect(tab.page.get_by_placeholder("Search commands...")).to_have_count(0)
-    expect(tab.row("Robot").locator("input").first).to_have_value("UR10e")
+        if words == "ur10e":  # an open question of the lesson may bring its own arm
+            expect(tab.row("Robot").locator("input").first).to_have_value("UR10e")
     expect(tab.page.get_by_role("tab", name="Learn")).to_have_attribute("aria-selected", "true")
     expect(tab.row("Lesson").locator("input").first).to_have_value("Velocity")
