@@ -6,6 +6,7 @@ because of a change, not by chance.
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import os
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from pathlib import Path
 import pytest
 from arms import ONE_OF_EACH_SOLVER, one_of_each_family
 from hypothesis import settings
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Playwright, sync_playwright
 
 import kin
 
@@ -151,13 +152,34 @@ def environment_unchanged() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """One Chromium for all tests of a process, which can run Playwright's synchronous interface once only."""
+def playwright() -> Iterator[Playwright]:
+    """Playwright's synchronous interface, which a process can run once only."""
+    with sync_playwright() as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def browser(playwright: Playwright) -> Iterator[Browser]:
+    """One Chromium for all tests of a process."""
     if not CHROMIUM.exists():
         pytest.fail(
             f"no Chromium at {CHROMIUM}: install it (apt-get install chromium) or set KINBOARD_TEST_CHROMIUM"
         )
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        yield started
-        started.close()
+    started = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
+    yield started
+    started.close()
+
+
+@pytest.fixture(autouse=True)
+def no_loop_of_playwright(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Tests without a browser can run an event loop, in a process where others have a browser.
+
+    Between two calls Playwright's own loop waits in a greenlet of this thread, and counts as running all the time.
+    """
+    loop = None if "playwright" in request.node.fixturenames else asyncio._get_running_loop()
+    if loop is None:
+        yield
+        return
+    asyncio._set_running_loop(None)
+    yield
+    asyncio._set_running_loop(loop)
