@@ -16,6 +16,7 @@ from app.exports.worksheet.sheet import indexed
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings, memory
+from app.viewer.declared.panel import same
 from app.viewer.declared.scene import Color, Node
 from app.viewer.declared.work import Sweep, Work
 from app.viewer.drive import FRAME, Drive, locked
@@ -23,7 +24,7 @@ from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
 from app.viewer.views.templates import render
-from kin import Robot
+from kin import Obstacle, Robot
 from kin.escape import Exit, Exits
 from kin.escape.results import tool_motion
 from kin.singularity import singularities_at
@@ -73,11 +74,20 @@ class ExitFacts(Facts[ExitSettings]):
             return None
         return wanted if np.array_equal(wanted if drive is None else drive.here, self.arm.goal) else None
 
-    @property
+    @cached_property
+    def sought(self) -> tuple[Robot, Array, tuple[Obstacle, ...]] | None:
+        """The arm, its configuration and the obstacles for which ways out are shown; None: none are."""
+        return None if self.leaving is None else (self.arm.robot, self.leaving, self.arm.obstacles)
+
+    @cached_property
     def exits(self) -> Exits | None:
-        """The ways out; None: none are shown, or they are still searched."""
-        found: Exits | None = self.work("exits").value
-        return found if self.leaving is not None else None
+        """The ways out; None: none are shown, or they are still searched.
+
+        Those that were found for other obstacles are none: the search for these has not begun yet then.
+        """
+        result = self.work("exits")
+        found: Exits | None = result.value
+        return found if self.sought is not None and same(result.args, self.sought) else None
 
     @property
     def exit(self) -> Exit | None:
@@ -127,8 +137,8 @@ class StepOut(DeclaredFeature[ExitSettings, ExitFacts]):
     def running(self) -> Sequence[Work | Sweep]:
         f, arm = self.facts, self.facts.arm
         found: list[Work | Sweep] = [Work("singular", is_singular, (arm.robot, arm.goal), rest=REST)]
-        if f.leaving is not None:
-            found.append(Work("exits", self.stage.services.summaries.exits, (arm.robot, f.leaving, arm.obstacles)))
+        if f.sought is not None:
+            found.append(Work("exits", self.stage.services.summaries.exits, f.sought))
         if f.settings.drive is not None:
             found.append(Sweep(self._go_on_driving, FRAME))
         return found

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from app.shared.computations import ComputationCache, Subscription
@@ -86,6 +86,7 @@ class Result:
         done, total: progress of a shared computation; `total` is 0 until it is known.
         finished: whether it has ended.
         error: why there is no result.
+        args: those of the work that it is of. Until the feature has gone on, it may declare others already.
     """
 
     value: Any = None
@@ -93,6 +94,7 @@ class Result:
     total: int = 0
     finished: bool = False
     error: BaseException | None = None
+    args: tuple[Any, ...] = ()
 
 
 NOTHING = Result()
@@ -230,4 +232,4 @@ class Runner:
         if result is None and key not in self.results:
             return
         others = {name: one for name, one in self.results.items() if name != key}
-        self.results = others if result is None else {**others, key: result}
+        self.results = others if result is None else {**others, key: replace(result, args=self._jobs[key].args)}

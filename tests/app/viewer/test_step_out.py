@@ -217,6 +217,34 @@ def test_a_way_that_is_none_any_more_is_not_driven_on(page: BarePage, monkeypatc
     assert page.notices[-1].detail == "What the arm avoids has changed. Press Step out again."
 
 
+def place(page: BarePage) -> None:
+    """An obstacle is placed, and the page has not looked at what goes on yet."""
+    page.use(page.now.robot, page.now.goal, obstacles=(kin.Obstacle("sphere", (9.0, 9.0, 9.0), radius=0.1),))
+    assert page.feature is not None
+    page.feature.on_arm_changed(page.now.changes(None))
+
+
+@pytest.mark.parametrize("q", [UPRIGHT, WRIST], ids=["keeps the tool", "moves the tool"])
+def test_no_way_is_driven_that_was_found_for_other_obstacles(page: BarePage, q: np.ndarray) -> None:
+    page.use(STORE.get("ur5e" if q is WRIST else "iiwa14"))
+    step_out(page, q)
+    place(page)
+    assert page.feature is not None
+    page.feature.handle(("drive", 1), None)
+    assert np.array_equal(page.now.goal, q)
+    assert not page.notices
+
+
+def test_a_way_is_not_driven_on_once_there_are_other_obstacles(page: BarePage) -> None:
+    feature, _ = drive(page)
+    at = page.now.goal
+    place(page)
+    feature._go_on_driving(1 / 30)  # the sweep is due before the search has begun anew
+    assert np.array_equal(page.now.goal, at)
+    assert feature.settings.drive is None
+    assert page.notices[-1].detail == "What the arm avoids has changed. Press Step out again."
+
+
 def test_the_offer_ends_when_the_arm_is_moved(page: BarePage) -> None:
     step_out(page, WRIST)
     page.pose(STORE.get("ur5e").q_home)
