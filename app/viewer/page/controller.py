@@ -176,7 +176,7 @@ class ArmController:
         if self.target is not None or self.dragging or self.playing:
             return
         if renew or (self.avoid and self.now.contacts_at(self.goal)):
-            self._solve(kin.fk(self.robot, self.goal))
+            self._solve(self.now.T_goal)
 
     def _surroundings_changed(self, solve_again: bool) -> None:
         if solve_again:
@@ -278,7 +278,7 @@ class ArmController:
         self._in_base = self.scene.gizmo_in_base = in_base
         self._set_gizmo_axes()
         if not self.dragging:
-            self.scene.place_gizmo(kin.fk(self.robot, self.q) if self.target is None else self.target)
+            self._place_gizmo()
 
     def restore_target(self, T: Array, q: Array | None, ease: bool = False) -> None:
         """Set a saved target, and keep its saved configuration ``(n,)`` unless the new answer is closer to it."""
@@ -388,7 +388,6 @@ class ArmController:
         q = self._motion.at(now + self._pace.interval if fresh else now)
         arrived = not self._motion.moving
         self._pace.moving(self._client.client_id, self.dragging or self.playing or not arrived)
-        T = kin.fk(self.robot, q)
         self.scene.show(q)
         if not np.array_equal(q, self.q):
             self.q = q
@@ -396,14 +395,15 @@ class ArmController:
         if self.target is not None and arrived and self._reached and not self.dragging:
             # A task that leaves some motion open is complete: the target now is where the tool really is.
             self.target = None
-        if self.target is None:
-            if not self.dragging:
-                self.scene.place_gizmo(T)
-            self.scene.show_gap(T[:3, 3], None)
-        else:
-            target = self.target[:3, 3]
-            missed = not self._reached and float(np.linalg.norm(T[:3, 3] - target)) > _GAP
-            self.scene.show_gap(T[:3, 3], target if missed else None)
+        tool, target = self.now.T_tool[:3, 3], None if self.target is None else self.target[:3, 3]
+        if target is None and not self.dragging:
+            self._place_gizmo()
+        missed = target is not None and not self._reached and float(np.linalg.norm(tool - target)) > _GAP
+        self.scene.show_gap(tool, target if missed else None)
+
+    def _place_gizmo(self, again: bool = False) -> None:
+        """Place the gizmo at the target, or at the tool if the target follows it."""
+        self.scene.place_gizmo(self.now.T_tool if self.target is None else self.target, again)
 
     def show_gizmo_again(self) -> None:
         """Send the gizmo's pose once more after a drag, now that the visitor rests.
@@ -412,7 +412,7 @@ class ArmController:
         """
         if self._pulled and not self.dragging:
             self._pulled = False
-            self.scene.place_gizmo(kin.fk(self.robot, self.q) if self.target is None else self.target, again=True)
+            self._place_gizmo(again=True)
 
     def leave(self) -> None:
         """The visitor has disconnected: stop counting as a moving arm."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-import kin
 from app.viewer.feature import Stage
 from app.viewer.frames import FrameAxes
 from app.viewer.obstacles.words import sentence
@@ -101,7 +100,7 @@ class Numbers:
                 target = None if arm.open_target is None else arm.open_target[:3, 3]
                 passes = arm.scene.show_contact(arm.scene.contact_at(arm.q), target)
                 page.status.warn(" ".join(filter(None, (self._show_contacts(), passes))))
-                self._show_pose(kin.fk(arm.robot, arm.q), arm.open_target)
+                self._show_pose(arm.now.T_tool, arm.open_target)
             if self._sliders_due:
                 self._sliders_due = False
                 page.joints.sliders.show(arm.goal, self._dragged)
