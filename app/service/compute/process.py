@@ -61,6 +61,7 @@ class ComputeProcess:
         self.job: Job | None = None
         self.child: subprocess.Popen[bytes] | None = None
         self._started = -APART
+        self._lost = 0  # processes that have ended by themselves, or were killed while they loaded
         self._loading: threading.Timer | None = None  # while it loads the core
         self._stopped = threading.Event()
 
@@ -76,8 +77,15 @@ class ComputeProcess:
             self.wait()
 
     def wait(self) -> None:
-        """Wait until a process takes jobs, started if there is none; raises `LostError` if it does not."""
+        """Wait until a process takes jobs, started if there is none; raises `LostError` if it does not.
+
+        One that another thread has started and that ends meanwhile is an error here, too: the next one may take as
+        long to load.
+        """
+        before = self._lost
         with self._asking:
+            if self._lost != before:
+                raise LostError
             running = self._running()
             try:
                 self._load(running)
@@ -204,6 +212,7 @@ class ComputeProcess:
             self._loading = None
         with self._lock:
             self.child = None
+            self._lost += not expected
             silent = expected or self._stopped.is_set()
         code = _kill(ended)
         if not silent:

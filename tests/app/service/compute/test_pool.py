@@ -253,6 +253,18 @@ def test_one_that_hangs_while_it_loads_is_killed_and_the_service_is_ready_with_a
         wait_for(lambda: client.get("/readyz").json()["status"] == "ready", 60)
 
 
+def test_a_process_that_hangs_while_it_loads_fails_the_wait_once_it_is_killed(stand_ins, monkeypatch, caplog):
+    """Not after another one was given as long."""
+    monkeypatch.setattr(pool_jobs, "STAND_IN", "import time; time.sleep(60)")
+    monkeypatch.setattr(process, "LOADING", 2.0)
+    pool = stand_ins()
+    pool.start()
+    wait_for(lambda: pool.processes[0].pid is not None)
+    with pytest.raises(module.LostError):
+        pool.wait()
+    assert caplog.text.count("has not loaded the core") == 1
+
+
 @pytest.mark.parametrize("leaves", [False, True])
 def test_a_request_waits_for_a_process_that_loads_no_longer_than_its_time_and_client(
     stand_ins, monkeypatch, leaves
