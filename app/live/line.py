@@ -28,7 +28,7 @@ VALUES: Final = ("q", "gripper", "target", "result", "contacts", "program")
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
 # What changes nothing that undo restores.
-QUIET: Final = frozenset({"drives", "announce", "readings", "measured", "draw", "clear"})
+QUIET: Final = frozenset({"drives", "announce", "readings", "measured", "measured_gripper", "draw", "clear"})
 REPLIES: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -171,7 +171,7 @@ class Line:
             if self._program is not program:
                 return
             self._program, self.readings, self.measured, self.announced = None, None, None, None
-            left = {"drives": None, "announce": None, "clear": True, "measured": None}
+            left = {"drives": None, "announce": None, "clear": True, "measured": None, "measured_gripper": None}
             self._pending[DRAWS] = PendingUpdate(left)
         self._post(DRAWS, None)
 

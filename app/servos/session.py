@@ -73,7 +73,9 @@ class Gripper:
     @property
     def opening(self) -> float:
         """How far it is open, from 0 (closed) to 1 (open)."""
-        here = float(self._bus.positions([self.motor])[0])
+        return self._opening_at(float(self._bus.positions([self.motor])[0]))
+
+    def _opening_at(self, here: float) -> float:
         return float(np.clip((here - self._closed) / (self._open - self._closed), 0.0, 1.0))
 
     def go(self, opening: float) -> None:
@@ -84,12 +86,18 @@ class Gripper:
             self._bus.switch([self.motor], True)
         self._wanted = self._closed + opening * (self._open - self._closed)
 
-    def step(self, seconds: float) -> None:
-        """Go on, at a limited speed and not far ahead of where it is: what it holds, it squeezes no harder."""
-        if not self.on:
-            return
-        most = GRIPPER_SPEED / 100.0 * (self._high - self._low) * seconds
+    def step(self, seconds: float) -> float:
+        """Go on, at a limited speed and not far ahead of where it is: what it holds, it squeezes no harder.
+
+        Returns how far it was open before.
+        """
         here = float(self._bus.positions([self.motor])[0])
+        if self.on:
+            self._lead(here, seconds)
+        return self._opening_at(here)
+
+    def _lead(self, here: float, seconds: float) -> None:
+        most = GRIPPER_SPEED / 100.0 * (self._high - self._low) * seconds
         before = self._asked
         self._asked += float(np.clip(self._wanted - self._asked, -most, most))
         self._asked = float(np.clip(self._asked, here - SQUEEZE, here + SQUEEZE))
@@ -286,6 +294,8 @@ class Session:
                 self._page.readings = [own[motor] for motor in theirs]
             else:
                 self._page.measured = kin.motors.q_from_readings(self._robot, readings)
+            if self._gripper is not None:
+                self._show_measured(self._gripper.opening)
         except kin.InputError:
             if self._page.robot == self._shown:
                 raise  # else the page has just changed its arm
@@ -294,7 +304,12 @@ class Session:
         """Remove the ghost: nobody knows where the arm is."""
         if moving(self._shown):
             self._page.readings = None
-        self._page.measured = None
+        self._page.measured = self._page.measured_gripper = None
+
+    def _show_measured(self, opening: float) -> None:
+        """Say how far the gripper is open, if the page's arm has one."""
+        if self._page.gripper is not None:
+            self._page.measured_gripper = round(opening, 3)
 
     def _drive(self, release: bool) -> str:
         """Let the arm follow the page, from where it is; returns the word that ends it."""
@@ -368,7 +383,7 @@ class Session:
         before, self._opening = self._opening, self._page.gripper
         if before is not None and self._opening is not None and self._opening != before:
             self._gripper.go(self._opening)
-        self._gripper.step(CYCLE)
+        self._show_measured(self._gripper.step(CYCLE))
 
     def _write(self, scale: Scale, q: Array, joints: NDArray[np.bool_]) -> None:
         """Lead the servos of these joints ``(n,)`` to a configuration ``(n,)``, within their calibrated ranges."""

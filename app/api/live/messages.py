@@ -185,6 +185,11 @@ class LiveMessage(Body):
         description="Where a real arm is, drawn as a ghost beside the commanded one; null removes it. It may be "
         "outside the limits.",
     )
+    measured_gripper: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] | None = Field(
+        None,
+        description="How far the gripper of a real arm is open, a part of its range: 0 is closed, 1 open. Beside "
+        "`measured` in the tab Program; null removes it.",
+    )
     readings: Configuration | None = Field(
         None,
         description="What the motors of a real arm read, one of each motor that moves a joint, or of every motor, "
@@ -281,6 +286,8 @@ def read(text: str, robot: Robot, store: Store) -> Message:
     if "measured" in given:
         measured = body.measured
         values["measured"] = None if measured is None else configuration(robot, measured, "measured")
+    if "measured_gripper" in given:
+        values["measured_gripper"] = body.measured_gripper
     return Message(body.id, body.subscribe, values)
 
 

@@ -74,6 +74,7 @@ class Page:
         self._sent: int | None = None  # number of the newest configuration that is not answered
         self._refused: RefusedError | None = None
         self._measured: Array | None = None
+        self._measured_gripper: float | None = None
         self._readings: Array | None = None
         self._drives: str | None = None
         self._announced: dict[str, Any] | None = None
@@ -149,14 +150,17 @@ class Page:
 
     @gripper.setter
     def gripper(self, value: float) -> None:
-        opening = checked_opening("gripper", value)
-        if self.gripper is None:
-            raise InputError(
-                "gripper", value, f"an arm with a gripper that opens; the page shows {self._robot.name}"
-            )
+        opening = self._checked_opening("gripper", value)
         with self._lock:
             self._connection.stream(gripper=opening)
             self._values["gripper"] = opening
+
+    def _checked_opening(self, field: str, value: float) -> float:
+        """How far a gripper is open; raises `kin.InputError` for none, and while the arm on show has none."""
+        opening = checked_opening(field, value)
+        if self.gripper is None:
+            raise InputError(field, value, f"an arm with a gripper that opens; the page shows {self._robot.name}")
+        return opening
 
     @property
     def measured(self) -> Array | None:
@@ -168,6 +172,17 @@ class Page:
         q = None if value is None else self._robot.check_q(value, "measured")
         self._connection.stream(measured=None if q is None else q.tolist())
         self._measured = q
+
+    @property
+    def measured_gripper(self) -> float | None:
+        """How far the gripper of a real arm is open, from 0 (closed) to 1 (open). None: it is not known."""
+        return self._measured_gripper
+
+    @measured_gripper.setter
+    def measured_gripper(self, value: float | None) -> None:
+        opening = None if value is None else self._checked_opening("measured_gripper", value)
+        self._connection.stream(measured_gripper=opening)
+        self._measured_gripper = opening
 
     @property
     def readings(self) -> Array | None:
@@ -319,12 +334,15 @@ class Page:
         if not 0.01 <= rate <= 100.0:
             raise InputError("rate", rate, "a number from 0.01 to 100")
         track, began = recording.track(), time.monotonic()
-        for t, q, measured, opening in zip(track.t, track.commanded, track.measured, track.opening, strict=True):
+        rows = zip(track.t, track.commanded, track.measured, track.opening, track.measured_opening, strict=True)
+        for t, q, measured, opening, seen in rows:
             time.sleep(max(0.0, began + t / rate - time.monotonic()))
             if not np.isnan(q).any():
                 self.q = self._robot.clip(q)
-            if not np.isnan(opening) and self.gripper is not None:
-                self.gripper = opening
+            if self.gripper is not None:
+                if not np.isnan(opening):
+                    self.gripper = opening
+                self.measured_gripper = None if np.isnan(seen) else seen
             self.measured = None if np.isnan(measured).any() else measured
 
     def events(self) -> Iterator[Event]:
@@ -396,6 +414,8 @@ class Page:
             found.append({"announce": self._announced})
         if self._measured is not None:
             found.append({"measured": self._measured.tolist()})
+        if self._measured_gripper is not None:
+            found.append({"measured_gripper": self._measured_gripper})
         return found + [{"draw": {name: drawn}} for name, drawn in self.draw.shown.items()]
 
     def _note(self, message: Message) -> None:
@@ -433,7 +453,7 @@ class Page:
             self._robot = value = robot_of(value)
             for recording in self._recordings:
                 recording.end("another arm was shown")
-            self._measured = self._readings = None
+            self._measured = self._readings = self._measured_gripper = None
             self._sent = None
         elif name == "q":
             if self._sent is not None and "q" in self._values:

@@ -42,6 +42,7 @@ _TYPES: dict[str, dict[str, Any]] = {
     "measured": {"anyOf": [_NUMBERS, {"type": "null"}]},
     "readings": {"anyOf": [_NUMBERS, {"type": "null"}]},
     "gripper": {"type": ["number", "null"]},
+    "measured_gripper": {"type": ["number", "null"]},
     "drives": {"type": ["string", "null"]},
     "announce": {"type": ["object", "null"]},
     "play": {"type": "boolean"},

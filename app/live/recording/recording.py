@@ -25,6 +25,7 @@ from kin.transforms import Array
 SHOWN: Final = "/page/q"
 OPENED: Final = "/page/gripper"
 MEASURED: Final = "/sent/measured"
+MEASURED_GRIPPER: Final = "/sent/measured_gripper"
 # What was commanded, where the page itself was not recorded.
 SPOKEN: Final = {SHOWN: ("/sent/q", "/heard/q"), OPENED: ("/sent/gripper", "/heard/gripper")}
 READ: Final = "read from a file"  # why one has ended that was not made here
@@ -54,12 +55,14 @@ class Track:
         t: times ``(k,)`` of changes, seconds.
         commanded, measured: configurations ``(k, n)``, radians (metres); NaN before the first one.
         opening: how far the gripper was to be open ``(k,)``, 0 (closed) to 1 (open); NaN before the first one.
+        measured_opening: how far it was measured to be open ``(k,)``; NaN where nobody knows.
     """
 
     t: Array
     commanded: Array
     measured: Array
     opening: Array
+    measured_opening: Array
 
     def at(self, time: float) -> tuple[Array | None, Array | None]:
         """What was commanded and measured at a time ``(n,)``, or at the first one; None: nothing yet."""
@@ -73,6 +76,11 @@ class Track:
         later = self.opening[self._row(time) :]
         known = later[:1] if not np.isnan(later[:1]).any() else later[~np.isnan(later)]
         return float(known[0]) if len(known) else None
+
+    def measured_opening_at(self, time: float) -> float | None:
+        """How far the gripper was measured to be open at a time; None: nobody knows."""
+        found = self.measured_opening[self._row(time) :][:1]
+        return None if np.isnan(found).any() or not len(found) else float(found[0])
 
     def _row(self, time: float) -> int:
         return max(int(np.searchsorted(self.t, time, side="right")) - 1, 0)
@@ -221,9 +229,10 @@ def too_large(most: int) -> InputError:
 def _track(entries: list[Entry], n: int) -> Track:
     topics = {each.topic for each in entries}
     spoken = {topic for page, said in SPOKEN.items() for topic in ((page,) if page in topics else said)}
-    wanted = [each for each in entries if each.topic in spoken or each.topic == MEASURED]
-    now = {"q": np.full(n, np.nan), "measured": np.full(n, np.nan), "gripper": np.full(1, np.nan)}
-    found = np.empty((len(wanted), 2 * n + 1))
+    wanted = [each for each in entries if each.topic in spoken or each.topic in (MEASURED, MEASURED_GRIPPER)]
+    sizes = {"q": n, "measured": n, "gripper": 1, "measured_gripper": 1}
+    now = {name: np.full(size, np.nan) for name, size in sizes.items()}
+    found = np.empty((len(wanted), 2 * n + 2))
     for k, each in enumerate(wanted):
         field = each.topic.rpartition("/")[2]
         try:
@@ -232,13 +241,13 @@ def _track(entries: list[Entry], n: int) -> Track:
             if error.syntax:
                 raise
             raise InputError(f"recording, {each.topic}", error.value, error.expected) from None
-        if field == "gripper":
+        if field.endswith("gripper"):
             now[field][:] = _opening(value)
         else:
             now[field][:] = np.nan if value is None or len(value) != n else _values(value, n)
         found[k] = np.concatenate([*now.values()])
     t = np.array([each.time for each in wanted])
-    return Track(t, found[:, :n], found[:, n : 2 * n], found[:, 2 * n])
+    return Track(t, found[:, :n], found[:, n : 2 * n], found[:, 2 * n], found[:, 2 * n + 1])
 
 
 def _opening(given: object) -> float:

@@ -9,13 +9,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from app.live.recording.recording import MEASURED, OPENED, SHOWN, Bounds, Entry, Recording
+from app.live.recording.recording import MEASURED, MEASURED_GRIPPER, OPENED, SHOWN, Bounds, Entry, Recording
 from kin import InputError, Robot
 from kin.parsing import Limits, TextError, read_csv
 
 LONGEST_ROW = 16 * 1024  # characters: two numbers and names for each of 32 joints are a few thousand
 WAYS = {"commanded": SHOWN, "measured": MEASURED}
-GRIPPER = "gripper (0 to 1)"  # the last column, if anything is known of it
+GRIPPER = "gripper (0 to 1)"  # the column behind the joints, if anything is known of it
+GRIPPERS = [GRIPPER, "measured gripper (0 to 1)"]  # both, if it was measured
 
 
 def heads(robot: Robot) -> list[str]:
@@ -32,8 +33,9 @@ def to_csv(recording: Recording) -> str:
     """What was commanded and measured at each change, joint by joint; an empty cell: nothing yet."""
     track = recording.track()
     columns, names = [track.commanded, track.measured], heads(recording.robot)
-    if not np.isnan(track.opening).all():
-        columns, names = [*columns, track.opening[:, None]], [*names, GRIPPER]
+    openings = [track.opening[:, None], track.measured_opening[:, None]]
+    known = max((k for k, each in enumerate(openings, 1) if not np.isnan(each).all()), default=0)
+    columns, names = [*columns, *openings[:known]], [*names, *GRIPPERS[:known]]
     lines = [",".join(names)]
     for t, row in zip(track.t.tolist(), np.hstack(columns).tolist(), strict=True):
         cells = ["" if value != value else repr(value) for value in row]
@@ -50,13 +52,16 @@ def from_csv(data: bytes, robot: Robot, bounds: Bounds) -> Recording:
     rows = read_csv(data, Limits(bounds.size, LONGEST_ROW))
     try:
         _, first = next(rows, (0, []))
-        if first not in (heads(robot), [*heads(robot), GRIPPER]):
+        if first not in [[*heads(robot), *GRIPPERS[:count]] for count in range(3)]:
             raise _other_table(first, robot)
         columns = {topic: slice(1 + k * robot.n, 1 + (k + 1) * robot.n) for k, topic in enumerate(WAYS.values())}
-        columns[OPENED] = slice(1 + 2 * robot.n, len(first))
+        for topic, place in zip((OPENED, MEASURED_GRIPPER), range(1 + 2 * robot.n, len(first)), strict=False):
+            columns[topic] = slice(place, place + 1)
         entries: list[Entry] = []
         last, seen = 0.0, dict.fromkeys(columns, "")
         for line, row in rows:
+            if len(row) != len(first):
+                raise InputError(f"recording, line {line}", f"{len(row)} cells", f"{len(first)} cells")
             last = _take(row, line, columns, last, seen, entries)
     except TextError as error:
         valid = "a recording of a connection (CSV)" if error.syntax else error.expected
@@ -73,15 +78,13 @@ def _take(
     entries: list[Entry],
 ) -> float:
     """Add what has changed in a row since those before; returns its time. `columns`: of each topic."""
-    if len(row) != columns[OPENED].stop:
-        raise InputError(f"recording, line {line}", f"{len(row)} cells", f"{columns[OPENED].stop} cells")
     t = _number(row[0], line)
     if t < last:
         raise InputError(f"recording, line {line}", row[0], f"a time from {last:g} s on")
     before = len(entries)
     for topic, place in columns.items():
         values = [_number(cell, line) for cell in row[place]] if any(row[place]) else None
-        value = values[0] if values and topic == OPENED else values
+        value = values[0] if values and topic in (OPENED, MEASURED_GRIPPER) else values
         text = json.dumps({topic.rpartition("/")[2]: value})
         if text != seen[topic] and (values is not None or seen[topic]):
             entries.append(Entry(t, topic, text.encode()))

@@ -30,6 +30,7 @@ from app.viewer.live.tape import BYTES, LONGEST, OF_ALL, WRITERS, Tape
 from app.viewer.meshes.archive import MeshError
 from app.viewer.meshes.incoming import IncomingFile, not_sent
 from app.viewer.own_arm import own_arm
+from app.viewer.page.controller import ArmController
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
 from kin import InputError, KinematicsError, robot_to_dict
@@ -47,6 +48,12 @@ GHOST, OPACITY = (230, 159, 0), 0.45
 AT_HINT = "Shows the arm as it was commanded then, and the measured arm beside it"
 
 
+def check_gripper(arm: ArmController, field: str, opening: float) -> None:
+    """Raises `InputError` while the arm on show has no gripper that opens."""
+    if arm.opening is None:
+        raise InputError(field, opening, f"an arm with a gripper that opens; the page shows {arm.robot.name}")
+
+
 @dataclass(frozen=True)
 class TapeSettings(Settings):
     """Where the recording is shown, and what a program sends. A link keeps nothing of a connection.
@@ -54,6 +61,7 @@ class TapeSettings(Settings):
     Attributes:
         drawings: what the program draws.
         measured: where it has measured the arm ``(n,)``.
+        measured_gripper: how far it has measured the gripper to be open, from 0 (closed) to 1 (open).
         driven: what it drives.
         announced: what it says of itself and offers, and a number of its own.
         said: what it has said of itself last.
@@ -64,6 +72,7 @@ class TapeSettings(Settings):
     at: float = slider("Time (s)", 0.0, (0.0, LONGEST), hint=AT_HINT, digits=2, step=0.01, link=False)
     drawings: Drawings | None = memory(renew=False)
     measured: Array | None = memory()
+    measured_gripper: float | None = memory()
     driven: str = memory("", renew=False)
     announced: tuple[int, Announcement] | None = memory(renew=False)
     said: Announcement | None = memory(renew=False)
@@ -111,10 +120,20 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
             if measured is not None:
                 measured = self.stage.arm.now.robot.check_q(measured, "measured")
             self.change(measured=measured)
+        if "measured_gripper" in values:
+            opening = values["measured_gripper"]
+            if opening is not None:
+                check_gripper(self.stage.arm, "measured_gripper", opening)
+            self.change(measured_gripper=opening)
         if values.get("clear"):
             self.change(drawings=None)
         if drawn := values.get("draw"):
             self.change(drawings=merged(self.settings.drawings or {}, drawn, self._numbers))
+
+    def follow_gripper(self) -> None:
+        """The gripper on show opens or closes: by how much the measured one is beyond is another difference."""
+        if self.settings.measured_gripper is not None:
+            self.schedule()
 
     def _show_driven(self) -> None:
         """Frame the page while something is driven, with what stops it."""
@@ -199,7 +218,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
         if recording is None:
             return
         self._tape.open(recording)
-        self.change(at=0.0, measured=None)
+        self.change(at=0.0, measured=None, measured_gripper=None)
         self.rewrite()
         if recording.robot != self.stage.arm.now.robot and not self.settings.driven:
             self.on_show_arm()
@@ -287,7 +306,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
             if (measured := self._driven_arm()) is not None:
                 self._tape.lead(seconds, measured)
         else:
-            self.change(measured=self._tape.advance(seconds))
+            self.change(measured=self._tape.advance(seconds), measured_gripper=self._tape.measured_gripper)
         self.change(at=self._tape.time)
         self.rewrite()
 
@@ -307,11 +326,12 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     def _compared(self) -> list[PanelNode]:
         """Where the arm was measured, and by how much that is beyond where it is commanded."""
         f, measured = self.read, self.settings.measured
-        if measured is None:
+        opening, commanded = self.settings.measured_gripper, self.stage.arm.opening
+        joints = None if measured is None else (np.round(measured - f.q, 6).tobytes(), measured.tobytes())
+        fingers = None if opening is None or commanded is None else (opening, commanded)
+        if joints is None and fingers is None:
             return []
-        gap = np.round(measured - f.q, 6)
-        args = f.robot, gap.tobytes(), measured.tobytes(), self.stage.display.units
-        return [Html(views.measured, args, key="measured")]
+        return [Html(views.measured, (f.robot, joints, fingers, self.stage.display.units), key="measured")]
 
     def _recorded(self) -> list[PanelNode]:
         """The recording, and what can be done with it."""
@@ -383,7 +403,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
             words = f"Play recording has {self.settings.driven} go on from there."
             self.stage.status.show(Notice("hand", f"The recording at {self._tape.time:.2f} s", words))
         elif self._tape.playable:
-            self.change(measured=self._tape.show(self.settings.at))
+            self.change(measured=self._tape.show(self.settings.at), measured_gripper=self._tape.measured_gripper)
 
     def _driven_arm(self) -> Array | None:
         """Where a driven arm is ``(n,)``, as its program says; None: it does not."""
@@ -408,12 +428,13 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
     def on_discard(self) -> None:
         """Forget the recording, and the measured arm that it shows."""
         self._tape.discard()
-        self.change(measured=None)
+        self.change(measured=None, measured_gripper=None)
 
     def on_close(self) -> None:
         """Withdraw the code, and remove what the program has drawn."""
         self.stage.door.close()
         self._tape.end(STOPPED)
-        self.change(drawings=None, measured=None, program="", driven="", announced=None, halted="")
+        self.change(drawings=None, measured=None, measured_gripper=None)
+        self.change(program="", driven="", announced=None, halted="")
         self._show_driven()
         self.stage.status.show(Notice("hand", "The code is withdrawn", "No program can move this page with it."))

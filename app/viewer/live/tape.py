@@ -145,6 +145,11 @@ class Tape:
             self._stage.arm.move_to(q, Notice("hand", f"The recording at {time:.2f} s", words), at_once=True)
         return measured
 
+    @property
+    def measured_gripper(self) -> float | None:
+        """How far the gripper was measured to be open at the present time; None: nobody knows."""
+        return None if self._track is None else self._track.measured_opening_at(self.time)
+
     def _at(self, time: float) -> tuple[Array | None, Array | None]:
         """Where the arm was commanded to be, within its limits, and where it was measured."""
         assert self.recording is not None

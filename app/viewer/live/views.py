@@ -13,8 +13,7 @@ from app.viewer.live.tape import BYTES, SECONDS
 from app.viewer.panel.share import box_html
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, fixed
 
 
 def about() -> str:
@@ -120,14 +119,22 @@ def recording(seconds: float, count: int, size: int, state: str, why: str, other
     )
 
 
-def measured(robot: Robot, gap: bytes, q: bytes, units: Units) -> str:
-    """The measured joint values, and by how much they are beyond those on show."""
+def measured(
+    robot: Robot, joints: tuple[bytes, bytes] | None, fingers: tuple[float, float] | None, units: Units
+) -> str:
+    """The measured joint values and opening of the gripper, and by how much they are beyond those on show.
+
+    Args:
+        joints: by how much they are beyond, and the values.
+        fingers: how far the gripper is open, as measured and as on show.
+    """
     rows = []
-    for joint, turns, value, apart in zip(robot.joints, robot.revolute, _values(q), _values(gap), strict=True):
-        unit = units.of(bool(turns))
-        rows.append((joint.name, unit.number(value), unit.number(apart), unit.suffix))
+    if joints is not None:
+        gap, q = map(np.frombuffer, joints)
+        for joint, turns, value, apart in zip(robot.joints, robot.revolute, q, gap, strict=True):
+            unit = units.of(bool(turns))
+            rows.append((joint.name, unit.number(value), unit.number(apart), unit.suffix))
+    if fingers is not None:
+        opening, commanded = (100.0 * share for share in fingers)
+        rows.append(("Gripper", fixed(opening, 0), fixed(opening - commanded, 0), "%"))
     return render("live/measured", rows=rows)
-
-
-def _values(data: bytes) -> Array:
-    return np.frombuffer(data)

@@ -14,7 +14,7 @@ import numpy as np
 from app.live import Line
 from app.shared.problems import Problem, from_input_error, invalid_input, problem_of
 from app.shared.problems import problem as problem_document
-from app.viewer.live.feature import Connect
+from app.viewer.live.feature import Connect, check_gripper
 from app.viewer.own_arm import own_arm
 from app.viewer.panel.status import Notice
 from app.viewer.session.parts import Page
@@ -136,9 +136,7 @@ class LiveInput:
         self._page.arm.move_to(robot.clip(q), Notice("hand", f"Joints moved by {self._name}"), at_once=True)
 
     def _use_gripper(self, opening: float) -> None:
-        if self._page.arm.opening is None:
-            name = self._page.arm.robot.name
-            raise InputError("gripper", opening, f"an arm with a gripper that opens; the page shows {name}")
+        check_gripper(self._page.arm, "gripper", opening)
         self._page.arm.open_gripper(opening)
 
     def _use_target(self, target: tuple[Array, bool]) -> None:

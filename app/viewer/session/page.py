@@ -227,6 +227,8 @@ class VisitorPage(Worker):
 
     def on_gripper(self) -> None:
         self.panel.gripper.offer(self.arm.opening)
+        if (connect := self.live.connect) is not None:
+            connect.follow_gripper()
 
     def on_drag(self, start: Array, target: Array | None) -> None:
         self.numbers.use_drag(start, target)

@@ -22,6 +22,7 @@ from example_run import ExampleRun
 from fake_browser import FakeBrowser
 from feetech_bus import FeetechBus
 from live_server import ready, wait_for
+from test_gripper_channel import beside
 
 import kin
 from app.cli.parser import main
@@ -123,6 +124,9 @@ def test_the_mirror_shows_the_encoders_and_writes_nothing(page, bus, run):
     page.wait(lambda: shows(page, bus))
     bus.servos[2].position += 300.0
     page.wait(lambda: shows(page, bus))
+    low, high = RANGES[5]
+    bus.servos[6].position = low + 0.25 * (high - low)
+    page.wait(lambda: beside(page)[:1] == ["25"])
     assert bus.written == []
     assert bus.refused == 0
 
@@ -394,6 +398,7 @@ def test_the_gripper_follows_slider_and_program(page, bus, run, typed, patient, 
     assert not bus.servos[6].memory[TORQUE], "it is switched on when the slider is moved"
     page.set("Gripper (%)", 80)
     page.wait(lambda: opening() == pytest.approx(0.8, abs=0.005))
+    page.wait(lambda: beside(page) == ["80", "0", "%"])
     q = np.radians(measured(page)).tolist()
     rows = f"[[segments]]\nkind = 'ptp'\nq = {q}\n[[segments]]\nkind = 'gripper'\nopening = 0.3\nseconds = 1\n"
     for name, value in (("upload", ["grip.toml", rows]), ("play", None)):
