@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
 import tomllib
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
+import kin
 from app.exercises import Lessons, shelf
 from app.exercises.lesson_text import LessonText, lesson_files
 from app.shared.clouds import Clouds
@@ -152,13 +154,38 @@ def test_of_a_file_that_is_edited_the_answers_stay_that_fit_its_questions(folder
         assert 'data-question="1" data-closed="1"' not in tab.html
 
 
-def test_a_file_that_no_longer_names_the_arm_asks_about_one_that_it_names(folder: Path, server: int) -> None:
-    data = tomllib.loads(lesson_files()["velocity"].read_text(encoding="utf-8"))
+@pytest.mark.parametrize(
+    ("lesson", "at"),
+    [
+        ("velocity", 0),
+        ("inverse", 3),  # a step that the lesson itself asks about the arm on show
+        ("screws", 4),
+    ],
+)
+def test_a_file_that_no_longer_names_the_arm_asks_about_one_that_it_names(
+    folder: Path, server: int, lesson: str, at: int
+) -> None:
+    data = tomllib.loads(lesson_files()[lesson].read_text(encoding="utf-8"))
+    before, after = (kin.get_robot(arm).name for arm in data["arms"][:2])
     with FakeBrowser(server) as tab:
+
+        def texts() -> list[str]:
+            """Those of the step on show, below what is said of the arm."""
+            step = tab.html.partition('data-guide="steps"')[2].partition("</section>")[0]
+            return re.findall("<p>(.+?)</p>", step)
+
         tab.settle()
-        tab.set("Lesson", "Velocity")
-        tab.wait(lambda: "1. A column" in tab.html)
-        (folder / "velocity.toml").write_text(to_toml(data | {"arms": ["ur5"]}), encoding="utf-8")
+        if data["arms"][0] != "pioneer5":  # which is on show at first
+            tab.choose(before)
+        tab.set("Lesson", next(each.title for each in LESSONS if each.key == lesson))
+        tab.wait(lambda: 'data-guide="steps"' in tab.html)
+        tab.say("feature", ["guide", ["go", 1], at])
+        tab.wait(lambda: f'data-step="{at + 1}"' in tab.html)
+        (folder / f"{lesson}.toml").write_text(to_toml(data | {"arms": data["arms"][1:]}), encoding="utf-8")
         tab.set("Radians", True)
-        tab.wait(lambda: "Ask this about UR5" in tab.html)
-        assert "Column i of the Jacobian is" in tab.html
+        tab.wait(lambda: f"Ask this about {after}" in tab.html)
+        assert texts()
+        tab.say("feature", ["guide", ["arm", 1], None])
+        tab.wait(lambda: f"This is asked about {after}" in tab.html)
+        tab.settle()
+        assert texts()
