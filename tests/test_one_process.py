@@ -7,6 +7,8 @@ import asyncio
 import pytest
 from playwright.sync_api import Browser
 
+pytestmark = pytest.mark.browser
+
 
 @pytest.fixture(scope="module", autouse=True)
 def used_before(request: pytest.FixtureRequest) -> None:
