@@ -3,8 +3,9 @@
 `Rights` decides for REST, both websockets of a page and what a link restores. Holders of the access token have
 full access; without a token everybody has it, unless the service is read-only. The one exception: exercises are
 saved on the service only by holders of the token or, without one, by browsers on the same machine. A read-only
-visitor may read pages and robots, and see the arm of a link from all sides, in the colours of their system and
-with texts of the size that they choose. Nothing is moved, solved, sampled or mapped for a read-only visitor.
+visitor may read pages and robots, and see the arm of a link from all sides, in the colours of their system, with
+texts of the size and numbers in the frame that they choose. Nothing is moved, solved, sampled or mapped for a
+read-only visitor.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
@@ -35,6 +36,10 @@ MEMORY = "LocalStorageGetItemResponseMessage"
 HELLO = "hello"  # in the page's channel: what it remembers
 SYSTEM_DARK = "system-dark"  # there too: whether the visitor's system is dark now
 TEXT_SIZE = "text-size"  # there too: of the labels in the visitor's scene
+FIT, LOOK_FROM = "fit-arm", "look-from"  # there too: where the visitor's own camera goes
+FRAME = "frame"  # there too: the frame in which the tool's pose is written
+# All that a visitor sends who may only look: what this page alone shows otherwise by it.
+LOOKS = frozenset({CAMERA, MEMORY, HELLO, SYSTEM_DARK, TEXT_SIZE, FIT, LOOK_FROM, FRAME})
 
 # Of a page and its first websocket, of its channel, of its files: below the prefix of the service.
 PAGE, CHANNEL, UPLOAD = "/viewer", "/viewer/channel", "/viewer/upload"
@@ -65,7 +70,7 @@ class Rights(Enum):
         Args:
             kind: its kind in viser's protocol, or its name in the page's channel.
         """
-        return self.compute or kind in (CAMERA, MEMORY, HELLO, SYSTEM_DARK, TEXT_SIZE)
+        return self.compute or kind in LOOKS
 
     @property
     def compute(self) -> bool:

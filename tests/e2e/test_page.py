@@ -6,12 +6,13 @@ On a phone the panel is a sheet, the scene gets the rest, and fingers drag slide
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from page import BLIND, WAIT, Tab
-from playwright.sync_api import Browser, expect
+from page import BLIND, NO_HINTS, WAIT, Tab
+from playwright.sync_api import Browser, Page, expect
 
 import kin
 from app.viewer.panel.joints import label
@@ -107,6 +108,20 @@ def test_a_page_that_may_only_look_follows_the_colours_of_the_system_and_the_siz
 
 
 @pytest.mark.full
+def test_a_page_that_may_only_look_looks_from_all_sides_and_chooses_the_frame_of_its_numbers(
+    browser: Browser, read_only_address: str
+) -> None:
+    page = browser.new_page()
+    page.add_init_script(BLIND + NO_HINTS)
+    page.goto(read_only_address + "viewer/")
+    expect(page.locator("[data-looking]")).to_be_attached(timeout=WAIT)
+    look_from_the_top(page)
+    page.get_by_label("Tool in the frame").select_option("base")
+    expect(page.locator("tr[data-type=position]")).to_have_attribute("title", re.compile("in the frame base"))
+    page.close()
+
+
+@pytest.mark.full
 def test_a_picture_is_offered_and_the_settings_of_viser_are_not(desktop: Tab, tmp_path: Path) -> None:
     tab = desktop
     with tab.page.expect_download() as download:
@@ -120,10 +135,8 @@ def test_a_picture_is_offered_and_the_settings_of_viser_are_not(desktop: Tab, tm
     expect(tab.page.locator(".tabler-icon-adjustments")).not_to_be_visible()
 
 
-@pytest.mark.full
-def test_the_toolbar_looks_from_the_top(desktop: Tab) -> None:
-    """The camera stands in the link, a moment after it has come to rest."""
-    page = desktop.page
+def look_from_the_top(page: Page) -> None:
+    """Press the button; the camera stands in the link, a moment after it has come to rest."""
     page.get_by_role("button", name="View from the top").click()
     page.wait_for_function("new URLSearchParams(location.hash.slice(1)).has('s')")
     for _ in range(100):
@@ -135,6 +148,12 @@ def test_the_toolbar_looks_from_the_top(desktop: Tab) -> None:
     assert chosen is not None
     above = chosen[0] - chosen[1]
     assert above[2] > 0.99 * np.linalg.norm(above)
+
+
+@pytest.mark.full
+def test_the_toolbar_looks_from_the_top(desktop: Tab) -> None:
+    page = desktop.page
+    look_from_the_top(page)
     desktop.open("View")
     page.get_by_role("button", name="Reset view").click()
 

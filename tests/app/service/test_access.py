@@ -415,7 +415,13 @@ def test_the_rights_of_a_visitor_who_may_only_look():
     assert not look.allow_websocket("/api/v1/robots/pioneer5/workspace/stream")
     known = {kind for kind in ALLOWED if look.allow_message(kind)}
     assert known == {"ViewerCameraMessage", "LocalStorageGetItemResponseMessage"}
-    assert [name for name in MESSAGES if look.allow_message(name)] == ["text-size", "system-dark"]
+    assert [name for name in MESSAGES if look.allow_message(name)] == [
+        "frame",
+        "text-size",
+        "system-dark",
+        "fit-arm",
+        "look-from",
+    ]
     assert all(map(full.allow_message, MESSAGES))
 
 
