@@ -228,8 +228,8 @@ const channel = (() => {
     },
     /** Have a new session be sent what `greet` returns before anything else. */
     greet: (greet) => { greeting = greet; },
-    /** Whether the session takes what acts: a page that may only look has a mark (app/viewer/page/picture.py). */
-    mayAct: () => document.querySelector("[data-looking]") === null,
+    /** Whether the session takes what acts: a page that may only look has a mark (app/viewer/page/picture.py), a frozen class too. */
+    mayAct: () => document.querySelector("[data-looking], [data-class-frozen]") === null,
     /** Ask the service for a sign of life. */
     ask: () => { if (isOpen()) socket.send('["ask"]'); },
     /** Call `act` with the value of a key, now if there is one and whenever it changes. */

@@ -468,6 +468,8 @@ const viserPage = (() => {
     /** The tracks of sliders and the elements of ours that match a selector, in the order of the page. */
     tracksAnd: (selector) => all(`${PARTS.track}, ${selector}`),
     isTrack: (node) => node.matches(PARTS.track),
+    /** viser's controls in the panel: fields, buttons, and the thumbs of sliders. */
+    controls: () => all(`${PARTS.scrollArea} :is(${PARTS.line} :is(input, textarea), ${PARTS.button}, ${PARTS.thumb})`),
     /** All buttons of viser's. */
     buttons: () => all(PARTS.button),
   };

@@ -99,6 +99,7 @@ _SCRIPTS = (
     b"drawer",
     b"hints",
     b"driven",
+    b"looking",
     b"describe",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints", b"keys")

@@ -31,6 +31,7 @@ class Panel:
     Args:
         own: the visitor's own arm.
         tabs: titles of the features' tabs.
+        typed: whether the visitor may type a target.
 
     Attributes:
         jog: buttons that move the arm in steps.
@@ -57,11 +58,12 @@ class Panel:
         welcome: Notice,
         tabs: Sequence[str],
         post: Post,
+        typed: bool,
     ) -> None:
         self.status = StatusLine(gui, welcome)
         add_html(gui, render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
-        self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
+        self.readout = PoseReadout(gui, fk(robot, robot.q_home), units, typed)
         group = gui.add_tab_group()
         with group.add_tab(MOVE):
             self.joints = gui.add_folder("Joints")

@@ -30,6 +30,7 @@ def html(
     frame: str = WORLD,
     withheld: Collection[str] = (),
     rotations: Rotations = DEFAULT,
+    typed: bool = True,
 ) -> str:
     """Position, angles such as roll, pitch, yaw, and quaternion of a pose ``(4, 4)`` as a small table.
 
@@ -38,6 +39,7 @@ def html(
         frame: name of the frame in which both are.
         withheld: rows that an open question asks for: position, angles, quaternion.
         rotations: how rotations are written.
+        typed: whether a click opens the form for a typed target.
     """
     lengths, angles = units.lengths, units.angles
     titles = (
@@ -47,21 +49,21 @@ def html(
     )
     tool = _parts(T_frame_tool, units, rotations)
     if T_frame_target is None:
-        texts = _between(titles, tuple(map(len, tool)), frozenset(withheld))
+        texts = _between(titles, tuple(map(len, tool)), frozenset(withheld), typed)
         shown = [numbers for title, numbers in zip(titles, tool, strict=True) if title[0] not in withheld]
         return "".join(chain.from_iterable(zip(texts, [*chain(*shown), ""], strict=True)))
     target = _parts(T_frame_target, units, rotations)
     rows = [(*title, numbers, wanted) for title, numbers, wanted in zip(titles, tool, target, strict=True)]
-    return render("panel/readout", rows=rows, withheld=withheld)
+    return render("panel/readout", rows=rows, withheld=withheld, typed=typed)
 
 
 @lru_cache(maxsize=64)
 def _between(
-    titles: Sequence[tuple[str, ...]], counts: tuple[int, ...], withheld: frozenset[str]
+    titles: Sequence[tuple[str, ...]], counts: tuple[int, ...], withheld: frozenset[str], typed: bool
 ) -> tuple[str, ...]:
     """The texts before, between and after the numbers of the table, which is written many times a second."""
     rows = [(*title, [_NUMBER] * count, ()) for title, count in zip(titles, counts, strict=True)]
-    return tuple(render("panel/readout", rows=rows, withheld=withheld).split(_NUMBER))
+    return tuple(render("panel/readout", rows=rows, withheld=withheld, typed=typed).split(_NUMBER))
 
 
 def _parts(T: Array, units: Units, rotations: Rotations) -> tuple[list[str], list[str], list[str]]:
@@ -92,11 +94,16 @@ def _numbers(values: Sequence[float], decimals: int) -> list[str]:
 
 
 class PoseReadout:
-    """Shows the tool's pose in a frame, and the form for a typed target, which ``static/input.js`` opens."""
+    """Shows the tool's pose in a frame, and the form for a typed target, which ``static/input.js`` opens.
 
-    def __init__(self, gui: viser.GuiApi, T_world_tool: Array, units: Units) -> None:
+    Args:
+        typed: whether the visitor may type a target.
+    """
+
+    def __init__(self, gui: viser.GuiApi, T_world_tool: Array, units: Units, typed: bool) -> None:
+        self._typed = typed
         self._choice = add_html(gui)
-        self._html = add_html(gui, html(T_world_tool, units))
+        self._html = add_html(gui, html(T_world_tool, units, typed=typed))
         self._form = add_html(gui)
         self.use_rotations(DEFAULT)
 
@@ -128,4 +135,4 @@ class PoseReadout:
         withheld: Collection[str] = (),
     ) -> None:
         """Replace the numbers; see `html`."""
-        update_html(self._html, html(T, units, target, frame, withheld, self._rotations))
+        update_html(self._html, html(T, units, target, frame, withheld, self._rotations, self._typed))

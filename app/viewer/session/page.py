@@ -356,6 +356,7 @@ class VisitorPage(Worker):
                 self._welcome,
                 [tab.title for tab in self.offered],
                 self.post,
+                self.rights.compute,
             )
             self.panel.readout.use_rotations(self.view.rotations)
             self.panel.fit(gui.main_panel, self._persistence.embedded)

@@ -1,0 +1,38 @@
+"use strict";
+// Runs in viser's page: where one may only look, and in a class that is frozen, what acts is disabled, so that no slider, field
+// or list shows what the arm does not. It comes back as soon as one may act again. What only changes how this page shows things
+// stays, as does what stops a connected program.
+(() => {
+  // Ours that acts on nothing but this page, or is let through (LOOKS in app/shared/security.py).
+  const FREE = [
+    "[data-frame]", "[data-text-size]", "[data-letter-keys]", "[data-keys-open]", "[data-copy]", "[data-wide-do]", "[data-arm-more]",
+    "[data-slow-close]", '[data-feature="connect"] [data-guide-do="halt"]', '[data-feature="connect"] [data-guide-do="stop"]',
+  ].join();
+  // In a frozen class, the tab Class and worksheets (Feature.acts) are free as well.
+  const FREE_IN_CLASS = '[data-feature="class"] *, [data-sheet-do]';
+  const OURS = "[data-part] :is(button, input, select, textarea)";
+
+  const off = new WeakSet(); // what is disabled here
+  function turn(control, acts) {
+    if (off.has(control) !== acts) return;
+    off[acts ? "delete" : "add"](control);
+    if (!viserPage.isThumb(control)) control.disabled = !acts;
+    else {
+      control.ariaDisabled = acts ? null : "true";
+      control.tabIndex = acts ? 0 : -1;
+    }
+  }
+
+  let looked = false; // whether something may be disabled
+  function follow() {
+    const acts = channel.mayAct();
+    if (acts && !looked) return;
+    looked = !acts;
+    const inClass = document.querySelector("[data-looking]") === null;
+    const free = inClass ? `${FREE}, ${FREE_IN_CLASS}` : FREE;
+    document.documentElement.toggleAttribute("data-kb-looks", !acts);
+    for (const control of dom.all(OURS)) turn(control, acts || control.matches(free));
+    for (const control of viserPage.controls()) turn(control, acts);
+  }
+  viserPage.watch(follow);
+})();

@@ -1,0 +1,35 @@
+"""A frozen class: what acts is disabled in the pages of students, and comes back without a reload."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Browser, expect
+from test_class import Member
+
+pytestmark = [pytest.mark.browser, pytest.mark.full]
+
+JOINT = "2 rotating elbow"
+
+
+def test_what_was_disabled_comes_back_when_a_frozen_class_goes_on(browser: Browser, address: str) -> None:
+    teacher = Member(browser, address)
+    student = Member(browser, address, teacher.code, "Ann")
+    page = student.page
+    student.open("Move")
+    slider, hand = page.get_by_role("slider", name=JOINT), page.locator("[data-class-bar] [data-guide-do=hand]")
+    acts = slider, page.get_by_role("button", name="Home"), student.row("Robot").locator("input:visible").first
+    for control in acts:
+        expect(control).to_be_enabled()
+    teacher.do("freeze")
+    student.shows("[data-class-frozen]")
+    for control in acts:
+        expect(control).to_be_disabled()
+    expect(hand).to_be_enabled()
+    teacher.do("freeze")
+    for control in (*acts, hand):
+        expect(control).to_be_enabled()
+    assert page.locator("[data-part] :disabled").count() == 0
+    student.type_number(JOINT, "44")
+    expect(slider).to_have_attribute("aria-valuenow", "44")
+    for member in (student, teacher):
+        member.close()
