@@ -31,7 +31,7 @@ from app.viewer.panel.status import BY_HAND, Notice
 from app.viewer.scene import gizmo
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import Drawing
-from app.viewer.scene.gizmo_axes import gizmo_axes
+from app.viewer.scene.gizmo_axes import NO_AXES, gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from kin import Obstacle, Robot
 from kin.differential.metric import weights
@@ -59,6 +59,9 @@ class ArmController:
 
     Call `use` before anything else.
 
+    Args:
+        draggable: whether the gizmo has arrows and rings.
+
     Attributes:
         robot: the selected robot.
         task: how much of the target pose the arm must match.
@@ -79,11 +82,14 @@ class ArmController:
     q: Array
     _motion: Motion
 
-    def __init__(self, client: viser.ClientHandle, pace: Pace, post: Post, listener: ArmListener) -> None:
+    def __init__(
+        self, client: viser.ClientHandle, pace: Pace, post: Post, listener: ArmListener, draggable: bool
+    ) -> None:
         self._client = client
         self._pace = pace
         self._post = post
         self._listener = listener
+        self._draggable = draggable
         self._rng = np.random.default_rng()
         self._reached = False
         self.task: Task = DEFAULT_TASK
@@ -420,5 +426,6 @@ class ArmController:
 
     def _set_gizmo_axes(self) -> None:
         """Give the gizmo the arrows and rings that the arm can follow in this task."""
-        for ring in self.scene.set_gizmo_axes(gizmo_axes(self.robot, self.task, self._in_base)):
+        axes = gizmo_axes(self.robot, self.task, self._in_base) if self._draggable else NO_AXES
+        for ring in self.scene.set_gizmo_axes(axes):
             gizmo.listen(ring, ring=True, post=self._post)

@@ -31,6 +31,9 @@ class GizmoAxes(NamedTuple):
     rings: tuple[bool, bool, bool]
 
 
+NO_AXES = GizmoAxes((False, False, False), (False, False, False))
+
+
 @lru_cache(maxsize=256)
 def gizmo_axes(robot: Robot, task: Task, in_base: bool = False) -> GizmoAxes:
     """The motions that the arm can follow almost everywhere in this task, judged at a few configurations.

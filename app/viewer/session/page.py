@@ -100,7 +100,7 @@ class VisitorPage(Worker):
         self.client, self.services, self.rights = client, services, rights
         self.meshes = services.meshes.of(address)
         self.bodies = Bodies(services.library, lambda why: self.post("body", why))
-        self.arm = ArmController(client, services.pace, self.post, self)
+        self.arm = ArmController(client, services.pace, self.post, self, rights.compute)
         self.robots = Robots(services.store, self.arm, self._change_robot)
         self.display = Display(self._frames_changed)
         self.view, self.system_dark = ViewState(), False

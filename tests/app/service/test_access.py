@@ -342,7 +342,9 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             assert tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.7)
             tab.say("text-size", "Large")
             tab.wait(lambda: tab.nodes["/key-number"]["props"]["font_screen_scale"] == pytest.approx(1.3))
-            before = tab.tool_pose()
+            before, gizmo = tab.tool_pose(), tab.nodes[tab.gizmo]["props"]
+            assert (any(gizmo["active_axes"]), gizmo["disable_rotations"]) == (False, True), "nor drag it"
+            assert not [name for name in tab.nodes if name.startswith(f"{tab.gizmo}/ring")]
             assert not tab.commands, "nor does the palette offer anything"
             tab.send("CommandTriggerMessage", uuid="guessed")
             tab.say("feature", ["robot", ["start"], "planar-2r"])

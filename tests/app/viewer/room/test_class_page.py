@@ -280,6 +280,12 @@ def test_who_is_frozen_cannot_move(room: Class) -> None:
     assert (student.value("1 rotating base"), student.value("Robot")) == (30.0, "Pioneer arm")
     number = student.say("feature", ["sheet", ["page", 1], None])  # printing a worksheet moves nothing
     student.wait(lambda: student.script["reply"] == [number, "", []])
+    place = student.local(student.gizmo)
+    away = place.copy()
+    away[2, 3] += 0.1
+    student.drag(away)
+    student.release()
+    student.wait(lambda: np.allclose(student.local(student.gizmo), place, atol=1e-6))
     press(student, "go")
     press(teacher, "freeze")
     student.wait(lambda: "data-class-frozen" not in student.html)
