@@ -32,7 +32,8 @@
     const free = inClass ? `${FREE}, ${FREE_IN_CLASS}` : FREE;
     document.documentElement.toggleAttribute("data-kb-looks", !acts);
     for (const control of dom.all(OURS)) turn(control, acts || control.matches(free));
-    for (const control of viserPage.controls()) turn(control, acts);
+    const view = viserPage.boxOf(document.querySelector("[data-looks]")); // the tab View
+    for (const control of viserPage.controls()) turn(control, acts || Boolean(view?.contains(control)));
   }
   viserPage.watch(follow);
 })();

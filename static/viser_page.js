@@ -470,6 +470,11 @@ const viserPage = (() => {
     isTrack: (node) => node.matches(PARTS.track),
     /** viser's controls in the panel: fields, buttons, and the thumbs of sliders. */
     controls: () => all(`${PARTS.scrollArea} :is(${PARTS.line} :is(input, textarea), ${PARTS.button}, ${PARTS.thumb})`),
+    /** The nearest box around an element that holds a control of viser's, or null: of a part of a tab, all of the tab. */
+    boxOf(node) {
+      while (node && !node.querySelector(PARTS.line)) node = node.parentElement;
+      return node;
+    },
     /** All buttons of viser's. */
     buttons: () => all(PARTS.button),
   };

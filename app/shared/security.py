@@ -3,9 +3,9 @@
 `Rights` decides for REST, both websockets of a page and what a link restores. Holders of the access token have
 full access; without a token everybody has it, unless the service is read-only. The one exception: exercises are
 saved on the service only by holders of the token or, without one, by browsers on the same machine. A read-only
-visitor may read pages and robots, and see the arm of a link from all sides, in the colours of their system, with
-texts of the size and numbers in the frame that they choose. Nothing is moved, solved, sampled or mapped for a
-read-only visitor.
+visitor may read pages and robots, and see the arm of a link from all sides, with what they choose in the tab
+*View*, and numbers in the frame that they choose. Nothing is moved, solved, sampled or mapped for a read-only
+visitor.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
@@ -38,8 +38,9 @@ SYSTEM_DARK = "system-dark"  # there too: whether the visitor's system is dark n
 TEXT_SIZE = "text-size"  # there too: of the labels in the visitor's scene
 FIT, LOOK_FROM = "fit-arm", "look-from"  # there too: where the visitor's own camera goes
 FRAME = "frame"  # there too: the frame in which the tool's pose is written
+CONTROL = "GuiUpdateMessage"  # of a control of viser's: who may only look changes those of the tab View alone
 # All that a visitor sends who may only look: what this page alone shows otherwise by it.
-LOOKS = frozenset({CAMERA, MEMORY, HELLO, SYSTEM_DARK, TEXT_SIZE, FIT, LOOK_FROM, FRAME})
+LOOKS = frozenset({CAMERA, MEMORY, HELLO, SYSTEM_DARK, TEXT_SIZE, FIT, LOOK_FROM, FRAME, CONTROL})
 
 # Of a page and its first websocket, of its channel, of its files: below the prefix of the service.
 PAGE, CHANNEL, UPLOAD = "/viewer", "/viewer/channel", "/viewer/upload"

@@ -104,6 +104,7 @@ class ViewerServer:
         log_what_viser_prints()
         server, self._connections = start_viser(loop, label="Kinboard")
         self._server = server
+        self._connections.lets_change = self._lets_change
         configure_theme(server.gui, dark=False)
         light_scene(server.scene)
         server.on_client_connect(self._connect)
@@ -130,6 +131,11 @@ class ViewerServer:
         if page is None:
             raise FileRefused(404, GONE)
         await page.files.receive(sent, parts)
+
+    def _lets_change(self, number: int, uuid: str) -> bool:
+        """Whether the page of this visitor, who may only look, lets a control be changed."""
+        page = self.pages.get(number)
+        return page is not None and uuid in page.free_controls
 
     def _page_named(self, name: str) -> VisitorPage | None:
         """The page whose channel has this name."""

@@ -50,6 +50,10 @@ class PortlessServer(infra.WebsockServer):
     Args:
         loop: the running event loop of the service.
         options: those of `viser.infra.WebsockServer`; host and port are not used.
+
+    Attributes:
+        visitors: who are connected, by client id.
+        lets_change: whether a visitor with this client id, who may only look, may change the control with this id.
     """
 
     def __init__(self, *, loop: asyncio.AbstractEventLoop, **options: Any) -> None:
@@ -57,7 +61,8 @@ class PortlessServer(infra.WebsockServer):
         self._background_event_loop = loop
         self._loop = loop
         self._ids = itertools.count()
-        self.visitors: dict[int, Connection] = {}  # who are connected, by client id
+        self.visitors: dict[int, Connection] = {}
+        self.lets_change: Callable[[int, str], bool] = lambda number, uuid: False
         self._open = 0  # connections
         self.waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
@@ -146,11 +151,18 @@ class PortlessServer(infra.WebsockServer):
                 message = self._message_class.deserialize(data)
             except Exception as error:  # fields are converted without checks
                 raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
+            allowed = self._is_allowed(connection, number, message)
             for handler in (self, client):
-                if type(message) in handler._incoming_handlers:
+                if allowed and type(message) in handler._incoming_handlers:
                     await self._handle(handler, number, message)
             if count % IN_A_ROW == 0:
                 await asyncio.sleep(0)  # others come between the messages of a burst
+
+    def _is_allowed(self, connection: Connection, number: int, message: infra.Message) -> bool:
+        """Whether a message that was let in is heard: of those who may only look, not of every control."""
+        if connection.rights.compute or not isinstance(message, messages.GuiUpdateMessage):
+            return True
+        return self.lets_change(number, message.uuid)
 
     async def _handle(
         self, handler: infra.WebsockMessageHandler, number: infra.ClientId, message: infra.Message

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from app.shared.security import CAMERA, MEMORY, Rights
+from app.shared.security import CAMERA, CONTROL, MEMORY, Rights
 
 # A message of the page is some hundred bytes long; a name typed into a field, or a stored state, may be longer.
 MAX_MESSAGE = 64 * 1024
@@ -22,7 +22,7 @@ RATE, BURST = 240.0, 480.0
 ALLOWED = frozenset(
     {
         CAMERA,
-        "GuiUpdateMessage",
+        CONTROL,
         "GuiButtonHoldMessage",
         "GuiFormSubmitMessage",
         "GuiFormDirtyMessage",
@@ -78,7 +78,7 @@ def admitted(message: bytes, rights: Rights) -> bool:
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
         raise MalformedMessageError("not a message of the viewer") from error
     kind = fields.get("type")
-    if kind == "GuiUpdateMessage":
+    if kind == CONTROL:
         # viser sets the attribute named in the message, whatever it is.
         updates = fields.get("updates")
         if not isinstance(updates, dict) or set(updates) - {"value"}:

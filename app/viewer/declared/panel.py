@@ -22,7 +22,7 @@ from app.viewer.declared.press import Press
 from app.viewer.panel import update_html
 from app.viewer.panel.fence import Crossings, Fence
 from app.viewer.panel.part import add_html
-from app.viewer.viser_patches import sent_value, show_value
+from app.viewer.viser_patches import sent_value, show_value, uuid_of
 from kin import InputError, Robot
 from kin.units import Units
 
@@ -237,6 +237,12 @@ class PanelView:
         one.known = found
         self._crossings.heard(serial)
         return settings.with_value(path, found)
+
+    @property
+    def ids(self) -> frozenset[str]:
+        """The ids of the controls and buttons."""
+        live = self._live.values()
+        return frozenset(uuid_of(one.handle) for one in live if one.spec is not None or one.events)
 
     def is_live(self, serial: object) -> bool:
         """Whether the control with this number is still there; 0: an event of no control."""

@@ -13,6 +13,7 @@ from app.shared.answers.embedding import MODES, frame
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.part import add_html
 from app.viewer.views.templates import render
+from app.viewer.viser_patches import uuid_of
 from kin import InputError
 
 
@@ -37,6 +38,11 @@ class SharePanel:
         add_html(gui, render("sheet/in_view"))
         self._moment: Moment | None = None
         self._withheld = False
+
+    @property
+    def choice_id(self) -> str:
+        """The id of the list of languages."""
+        return uuid_of(self._choice)
 
     def show(self, link: str, moment: Moment, withheld: bool = False) -> None:
         """Show this link, and the code for this moment.

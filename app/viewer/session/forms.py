@@ -58,6 +58,11 @@ class Forms:
             nodes = [*self._nodes[place], *(self._language() if place == "view" else ())]
             view.show(nodes, choices, robot, units)
 
+    @property
+    def view_ids(self) -> frozenset[str]:
+        """The ids of the controls of the tab *View*, which are never replaced."""
+        return self._views["view"].ids
+
     def read(self, place: str, path: str, serial: int, posted: object) -> PageChoices:
         """The choices with what a control has sent; for what it does not offer, it shows the present one again.
 

@@ -84,6 +84,7 @@ class VisitorPage(Worker):
 
     Attributes:
         tabs: the features of the tabs, none until the page is built.
+        free_controls: ids of the controls that may be changed by who may only look. Any thread may read it.
     """
 
     def __init__(
@@ -116,6 +117,7 @@ class VisitorPage(Worker):
         self._persistence = Persistence(self, self._guard)
         self.offered: tuple[type[Feature], ...] = TABS
         self.tabs: list[Feature] = []
+        self.free_controls: frozenset[str] = frozenset()
         self._result: IKResult | None = None  # for the last target
         self._palette: Palette | None = None
         # Created by the worker when it builds the page.
@@ -371,6 +373,7 @@ class VisitorPage(Worker):
                 self.door.open(robot, code)
             detailed = self.services.library.offered(self.services.store.robots)
             self.forms = Forms(gui, self.panel, self, lambda: self.view, detailed, self.post)
+            self.free_controls = self.forms.view_ids | {self.panel.share.choice_id}
             self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
             self._build_tabs()
             self._persistence.restore(saved)

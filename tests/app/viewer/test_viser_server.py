@@ -21,7 +21,7 @@ from viser.infra import _infra
 
 from app.shared.connection import ConnectionEnded
 from app.shared.security import Rights
-from app.viewer.viser_patches import keep_private
+from app.viewer.viser_patches import keep_private, uuid_of
 from app.viewer.viser_server import PROTOCOL, PortlessServer, start_viser
 
 # The text of the method that `PortlessServer` replaces. If viser changes it, read what has changed, and whether
@@ -329,3 +329,12 @@ def test_an_error_in_a_callback_of_a_drag_ends_nothing(server, serve):
     visits.append(Visit(CAMERA | {"type": "ViewerCameraMessage"}))
     assert serve(visits[0]) == (1001, "left")
     assert len(seen) == 4
+
+
+@pytest.mark.parametrize(("rights", "free"), [("look", False), ("look", True), ("full", False)])
+def test_who_may_only_look_changes_the_controls_that_are_free(server, serve, rights, free):
+    box = server[0].gui.add_checkbox("Box", False)
+    server[1].lets_change = lambda number, uuid: free and uuid == uuid_of(box)
+    update = {"type": "GuiUpdateMessage", "uuid": uuid_of(box), "updates": {"value": True}}
+    serve(Visit({"type": "ViewerCameraMessage"} | CAMERA, update, update, rights=Rights(rights)))
+    assert box.value == (free or rights == "full")

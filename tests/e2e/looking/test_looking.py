@@ -60,6 +60,9 @@ def test_what_acts_is_disabled_and_no_slider_moves(browser: Browser, read_only_a
     for key in ("Tab", "ArrowRight"):
         page.keyboard.press(key)
     expect(slider).to_have_attribute("aria-valuenow", before)
+    tab.open("View")
+    tab.check("Radians")
+    expect(tab.page.locator("tr[data-type=angles] .kb-unit")).to_have_text("rad")
     for title, names in IN_TABS.items():
         tab.open(title)
         expected = ["Tool in the frame", *(names[1:] if touch else names)]
