@@ -44,13 +44,14 @@
   addEventListener("dragover", (event) => {
     if (!holdsFiles(event) || !viserPage.tab("Robot")) return;
     event.preventDefault(); // the browser would open the file instead of the page
-    event.dataTransfer.dropEffect = "copy";
-    document.documentElement.setAttribute("data-arm-drop", "");
+    event.dataTransfer.dropEffect = channel.mayAct() ? "copy" : "none";
+    document.documentElement.toggleAttribute("data-arm-drop", channel.mayAct());
   });
   for (const name of ["dragleave", "drop"]) addEventListener(name, () => document.documentElement.removeAttribute("data-arm-drop"));
   addEventListener("drop", async (event) => {
     if (!holdsFiles(event) || !viserPage.tab("Robot")) return;
     event.preventDefault();
+    if (!channel.mayAct()) return;
     const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
     const found = entries.length ? [] : [...event.dataTransfer.files].map((file) => [file.name, file]);
     for (const entry of entries) await collect(entry, found);

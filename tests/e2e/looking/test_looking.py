@@ -20,6 +20,14 @@ ENABLED = """() => {
     .filter((each) => each.checkVisibility() && !each.disabled && each.ariaDisabled !== "true")
     .map((each) => each.ariaLabel ?? (each.labels?.[0] ?? each).textContent.trim());
 }"""
+# A file over the page: whether it is offered a place, and whether the page keeps the browser from opening it.
+DRAG = """(kind) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File(["x"], "arm.toml"));
+  const event = new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true });
+  const kept = !document.body.dispatchEvent(event);
+  return [document.documentElement.hasAttribute("data-arm-drop"), kept];
+}"""
 IN_TABS = {
     "Move": (),
     "Learn": (),
@@ -77,10 +85,19 @@ def test_nothing_asks_to_type_where_one_may_only_look(browser: Browser, read_onl
     expect(rows).to_have_count(3)
     for row in rows.all():
         expect(row).not_to_have_attribute("title", re.compile("Click"))
-    tab.page.goto(f"{read_only_address}viewer/#s={encode(PageState('crx10ia'))}")
-    tab.page.reload()
+    tab.page.goto(f"{read_only_address}viewer/?another#s={encode(PageState('crx10ia'))}")
     pendant = tab.page.get_by_role("button", name="Type joint values as the pendant shows them")
     expect(pendant).to_be_disabled()
     tab.page.locator("[data-pendant]").click(position={"x": 2, "y": 2})
     expect(tab.page.locator("[data-typed]")).to_be_hidden()
+    tab.close()
+
+
+def test_no_file_is_taken_where_one_may_only_look(browser: Browser, read_only_address: str) -> None:
+    tab = opened(browser, read_only_address)
+    tab.page.evaluate("window.kbSent = 0; channel.watchSent(() => { window.kbSent++; });")
+    for kind in ("dragover", "drop"):
+        assert tab.page.evaluate(DRAG, kind) == [False, True]
+    tab.page.wait_for_timeout(300)
+    assert tab.page.evaluate("window.kbSent") == 0
     tab.close()
