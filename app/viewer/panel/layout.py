@@ -15,7 +15,7 @@ from app.viewer.panel.part import add_html
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
 from app.viewer.panel.share import SharePanel
-from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.status import LOOKING, READY, Notice, StatusLine
 from app.viewer.views.templates import render
 from kin import Robot, fk
 from kin.units import Units
@@ -31,7 +31,7 @@ class Panel:
     Args:
         own: the visitor's own arm.
         tabs: titles of the features' tabs.
-        typed: whether the visitor may type a target.
+        acts: whether the visitor may act.
 
     Attributes:
         jog: buttons that move the arm in steps.
@@ -58,12 +58,12 @@ class Panel:
         welcome: Notice,
         tabs: Sequence[str],
         post: Post,
-        typed: bool,
+        acts: bool,
     ) -> None:
-        self.status = StatusLine(gui, welcome)
+        self.status = StatusLine(gui, welcome, READY if acts else LOOKING)
         add_html(gui, render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
-        self.readout = PoseReadout(gui, fk(robot, robot.q_home), units, typed)
+        self.readout = PoseReadout(gui, fk(robot, robot.q_home), units, acts)
         group = gui.add_tab_group()
         with group.add_tab(MOVE):
             self.joints = gui.add_folder("Joints")

@@ -167,11 +167,16 @@ class StatusLine:
 
     A notice is news until the visitor does something else; one without advice ends by itself, too.
 
+    Args:
+        first: the notice with which it begins.
+
     Attributes:
+        ready: what is shown where nothing else is to be said.
         count: how many notices were shown.
     """
 
-    def __init__(self, gui: viser.GuiApi, first: Notice) -> None:
+    def __init__(self, gui: viser.GuiApi, first: Notice, ready: Notice = READY) -> None:
+        self.ready = ready
         self.count = 0
         self._result: IKResult | None = None
         self._said: tuple[object, ...] | None = None  # what `_words` say; None: something that is not said again
@@ -255,7 +260,7 @@ class StatusLine:
             return
         self._news_since = None
         if result is None:
-            self.show(READY)
+            self.show(self.ready)
         else:
             self.show_result(result, units)
         self._news_since = None

@@ -17,7 +17,6 @@ from app.viewer.activity.activity import AUTHOR, EXERCISES, REVIEW
 from app.viewer.feature import Feature
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel.status import READY
 from app.viewer.room.member_page import MemberPage
 from app.viewer.session.history import without_results
 from app.viewer.session.state import PageState, decode
@@ -103,7 +102,7 @@ class Follower:
             self._page.arm.follow(state.q, state.target)
             self.moving, self.moved_at = True, time.perf_counter()
         if state.target is None and (last is None or last.target is not None):
-            self._page.status.show(READY)  # what it said was about another target
+            self._page.status.show(self._page.status.ready)  # what it said was about another target
         if self._compute:
             self._show_view(state)
             self._show_lesson(last, state)

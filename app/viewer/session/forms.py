@@ -41,7 +41,7 @@ class Forms:
     ) -> None:
         self._page, self._view, self._post = page, view, post
         self._nodes: dict[str, Sequence[Node]] = {
-            "view": _view(detailed),
+            "view": _view(detailed, page.rights.compute),
             "target": _target(),
             "obstacles": [Control("view.avoid")],
         }
@@ -102,13 +102,14 @@ class Forms:
                 self._post(event, None)
 
 
-def _view(detailed: Sequence[Robot]) -> list[Node]:
+def _view(detailed: Sequence[Robot], draggable: bool) -> list[Node]:
     names = ", ".join(robot.name for robot in detailed)
     shape = f"The body in every detail, from its maker's drawings, instead of our simplified one: {names}."
     return [
         *map(Control, ("radians", "lengths", "view.angles", "view.quaternions", "view.dark", "view.look")),
         *([Control("view.detailed", hint=shape)] if detailed else []),
-        *map(Control, ("view.frames", "view.labels", "view.axes", "view.base_axes")),
+        *map(Control, ("view.frames", "view.labels", "view.axes")),
+        Control("view.base_axes", visible=draggable),
         Html(_text_size),
         Buttons("Camera", {"Fit all": ("fit-arm",), "Reset view": ("camera",)}),
         Buttons("View from", {side: ("look-from", side) for side in SIDES}),

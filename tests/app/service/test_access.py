@@ -346,6 +346,7 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             before, gizmo = tab.tool_pose(), tab.nodes[tab.gizmo]["props"]
             assert (any(gizmo["active_axes"]), gizmo["disable_rotations"]) == (False, True), "nor drag it"
             assert not [name for name in tab.nodes if name.startswith(f"{tab.gizmo}/ring")]
+            assert not tab.gui[tab.element("Arrows along")]["props"]["visible"]
             assert not tab.commands, "nor does the palette offer anything"
             tab.send("CommandTriggerMessage", uuid="guessed")
             tab.say("feature", ["robot", ["start"], "planar-2r"])

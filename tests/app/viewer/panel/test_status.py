@@ -13,7 +13,7 @@ import kin
 from app.viewer.lessons.postures.lesson import Postures
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.panel import status as module
-from app.viewer.panel.status import NEWS, READY, Kind, Notice, StatusLine
+from app.viewer.panel.status import LOOKING, NEWS, READY, Kind, Notice, StatusLine
 from kin.units import DEFAULT_UNITS
 
 UNDONE = Notice("hand", "Undone: Home")
@@ -25,7 +25,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "UNSEEN", 0.0)
 
 
-def line(first: Notice = READY) -> tuple[StatusLine, Any]:
+def line(first: Notice = READY, ready: Notice = READY) -> tuple[StatusLine, Any]:
     element = SimpleNamespace(content="")
 
     def add_html(content: str, order: float | None = None) -> Any:
@@ -34,7 +34,7 @@ def line(first: Notice = READY) -> tuple[StatusLine, Any]:
 
     gui = Mock()
     gui.add_html = add_html
-    return StatusLine(gui, first), element
+    return StatusLine(gui, first, ready), element
 
 
 def test_news_end_after_some_seconds_and_the_present_state_follows() -> None:
@@ -49,6 +49,14 @@ def test_news_end_after_some_seconds_and_the_present_state_follows() -> None:
     status.settle(None, DEFAULT_UNITS)
     assert "<b>Ready</b>" in element.content
     assert status.due(now + 10.0 * NEWS) is None
+
+
+def test_after_the_news_who_may_only_look_is_not_asked_to_drag_anything() -> None:
+    status, element = line(LOOKING, LOOKING)
+    status.show(UNDONE)
+    status.settle(None, DEFAULT_UNITS)
+    assert "You may look" in element.content
+    assert READY.detail not in element.content
 
 
 def test_news_are_shown_for_a_moment_whatever_else_happens(monkeypatch: pytest.MonkeyPatch) -> None:
