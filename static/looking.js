@@ -8,7 +8,8 @@
     "[data-frame]", "[data-text-size]", "[data-letter-keys]", "[data-keys-open]", "[data-copy]", "[data-wide-do]", "[data-arm-more]",
     "[data-slow-close]", '[data-feature="connect"] [data-guide-do="halt"]', '[data-feature="connect"] [data-guide-do="stop"]',
   ].join();
-  // In a frozen class, the tab Class and worksheets (Feature.acts) are free as well.
+  // In a frozen class, the tab Class and worksheets (Feature.acts) are free as well, and viser's buttons without a label, by which
+  // features begin and end their work: one of them withdraws the code of a connected program.
   const FREE_IN_CLASS = '[data-feature="class"] *, [data-sheet-do]';
   const OURS = "[data-part] :is(button, input, select, textarea)";
 
@@ -33,7 +34,9 @@
     document.documentElement.toggleAttribute("data-kb-looks", !acts);
     for (const control of dom.all(OURS)) turn(control, acts || control.matches(free));
     const view = viserPage.boxOf(document.querySelector("[data-looks]")); // the tab View
-    for (const control of viserPage.controls()) turn(control, acts || Boolean(view?.contains(control)));
+    for (const control of viserPage.controls()) {
+      turn(control, acts || Boolean(view?.contains(control)) || (inClass && !viserPage.lineAt(control)));
+    }
   }
   viserPage.watch(follow);
 })();

@@ -25,6 +25,11 @@ def test_what_was_disabled_comes_back_when_a_frozen_class_goes_on(browser: Brows
     for control in acts:
         expect(control).to_be_disabled()
     expect(hand).to_be_enabled()
+    student.open("View")
+    expect(student.row("Radians").locator("input")).to_be_enabled()
+    student.open("Program")
+    expect(page.get_by_role("button", name="Connect a program")).to_be_enabled()
+    student.open("Move")
     teacher.do("freeze")
     for control in (*acts, hand):
         expect(control).to_be_enabled()
