@@ -293,6 +293,22 @@ def test_who_is_frozen_cannot_move(room: Class) -> None:
     at(student, q)
 
 
+def test_what_a_frozen_student_drags_goes_back_though_nobody_leads(room: Class) -> None:
+    teacher, (student, _) = room.teacher(), room.join("Ann")
+    press(teacher, "freeze")
+    student.wait(lambda: "data-class-frozen" in student.html)
+    student.settle()
+    place = student.local(student.gizmo)
+    away = place.copy()
+    away[2, 3] += 0.1
+    student.grab()
+    student.drag(away)
+    student.release()
+    student.wait(lambda: "has frozen the class" in student.html)
+    student.settle()
+    assert np.allclose(student.local(student.gizmo), place, atol=1e-6)
+
+
 def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     teacher, student, ticket, _ = lead(room)
     press(teacher, "fields", "task", value=[[EXERCISE]])
