@@ -13,9 +13,10 @@
   const FREE_IN_CLASS = '[data-feature="class"] *, [data-sheet-do]';
   const OURS = "[data-part] :is(button, input, select, textarea)";
 
-  const off = new WeakSet(); // what is disabled here
+  const off = new WeakSet(); // what is disabled here, and not by viser or the service
+  const isOff = (control) => (viserPage.isThumb(control) ? control.ariaDisabled === "true" : control.disabled);
   function turn(control, acts) {
-    if (off.has(control) !== acts) return;
+    if (acts ? !off.has(control) : isOff(control)) return; // one that was enabled again meanwhile is disabled again
     off[acts ? "delete" : "add"](control);
     if (!viserPage.isThumb(control)) control.disabled = !acts;
     else {
@@ -38,5 +39,5 @@
       turn(control, acts || Boolean(view?.contains(control)) || (inClass && !viserPage.lineAt(control)));
     }
   }
-  viserPage.watch(follow);
+  viserPage.watch(follow, { on: ["childList", "disabled"] });
 })();

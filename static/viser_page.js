@@ -50,7 +50,7 @@ const viserPage = (() => {
 
   const VALUE = "aria-valuenow"; // of a slider's thumb
   const COLOURS = "data-mantine-color-scheme"; // of the page
-  const ATTRIBUTES = [VALUE, COLOURS, "aria-hidden", "open", "data-time", "data-playing", "data-at", "data-duration"];
+  const ATTRIBUTES = [VALUE, COLOURS, "aria-hidden", "disabled", "open", "data-time", "data-playing", "data-at", "data-duration"];
   const watchers = [];
   const valueWatchers = new WeakMap(); // thumb → what to call
 

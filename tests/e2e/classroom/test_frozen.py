@@ -38,3 +38,22 @@ def test_what_was_disabled_comes_back_when_a_frozen_class_goes_on(browser: Brows
     expect(slider).to_have_attribute("aria-valuenow", "44")
     for member in (student, teacher):
         member.close()
+
+
+def test_what_others_disable_and_enable_keeps_its_state(browser: Browser, address: str) -> None:
+    """As where viser or the service enables a control of a frozen class, or has disabled one before."""
+    teacher = Member(browser, address)
+    student = Member(browser, address, teacher.code, "Ann")
+    student.open("Move")
+    home, recall = (student.page.get_by_role("button", name=name) for name in ("Home", "Move target to tool"))
+    recall.evaluate("button => { button.disabled = true; }")
+    teacher.do("freeze")
+    student.shows("[data-class-frozen]")
+    expect(home).to_be_disabled()
+    home.evaluate("button => { button.disabled = false; }")
+    expect(home).to_be_disabled()
+    teacher.do("freeze")
+    expect(home).to_be_enabled()
+    expect(recall).to_be_disabled()
+    for member in (student, teacher):
+        member.close()
