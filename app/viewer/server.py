@@ -135,7 +135,7 @@ class ViewerServer:
     def _lets_change(self, number: int, uuid: str) -> bool:
         """Whether the page of this visitor, who may only look, lets a control be changed."""
         page = self.pages.get(number)
-        return page is not None and uuid in page.free_controls
+        return page is not None and page.lets_change(uuid)
 
     def _page_named(self, name: str) -> VisitorPage | None:
         """The page whose channel has this name."""

@@ -28,7 +28,12 @@ class Forms:
     Args:
         view: gives the choices of the tab *View*.
         detailed: the robots that have a detailed body; a choice of it only if there are some.
+
+    Attributes:
+        view_ids: the ids of the controls of the tab *View*. Any thread may read it.
     """
+
+    view_ids: frozenset[str]
 
     def __init__(
         self,
@@ -57,11 +62,7 @@ class Forms:
         for place, view in self._views.items():
             nodes = [*self._nodes[place], *(self._language() if place == "view" else ())]
             view.show(nodes, choices, robot, units)
-
-    @property
-    def view_ids(self) -> frozenset[str]:
-        """The ids of the controls of the tab *View*, which are never replaced."""
-        return self._views["view"].ids
+        self.view_ids = self._views["view"].ids  # that of the languages comes with a second one
 
     def read(self, place: str, path: str, serial: int, posted: object) -> PageChoices:
         """The choices with what a control has sent; for what it does not offer, it shows the present one again.

@@ -84,7 +84,6 @@ class VisitorPage(Worker):
 
     Attributes:
         tabs: the features of the tabs, none until the page is built.
-        free_controls: ids of the controls that may be changed by who may only look. Any thread may read it.
     """
 
     def __init__(
@@ -117,7 +116,6 @@ class VisitorPage(Worker):
         self._persistence = Persistence(self, self._guard)
         self.offered: tuple[type[Feature], ...] = TABS
         self.tabs: list[Feature] = []
-        self.free_controls: frozenset[str] = frozenset()
         self._result: IKResult | None = None  # for the last target
         self._palette: Palette | None = None
         # Created by the worker when it builds the page.
@@ -144,6 +142,10 @@ class VisitorPage(Worker):
     def features(self) -> list[Feature]:
         """The tabs, and the open lesson with its steps."""
         return [*self.tabs, *self.lessons.features] if self.tabs else []
+
+    def lets_change(self, uuid: str) -> bool:
+        """Whether a visitor who may only look may change the control with this id. Any thread may ask."""
+        return bool(self.tabs) and (uuid in self.forms.view_ids or uuid == self.panel.share.choice_id)
 
     def open_choice(self, title: str) -> None:
         """Open another choice of the tab *Learn*, in the same step for undo."""
@@ -373,7 +375,6 @@ class VisitorPage(Worker):
                 self.door.open(robot, code)
             detailed = self.services.library.offered(self.services.store.robots)
             self.forms = Forms(gui, self.panel, self, lambda: self.view, detailed, self.post)
-            self.free_controls = self.forms.view_ids | {self.panel.share.choice_id}
             self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
             self._build_tabs()
             self._persistence.restore(saved)

@@ -17,10 +17,11 @@ import kin
 from app.exercises import Lessons, shelf
 from app.exercises.lesson_text import LessonText, lesson_files
 from app.shared.clouds import Clouds
-from app.shared.settings import Settings
+from app.shared.settings import Settings, static_folder
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.server import ViewerServer
+from app.viewer.session.state import PageState, encode
 from kin.parsing import to_toml
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -152,6 +153,27 @@ def test_of_a_file_that_is_edited_the_answers_stay_that_fit_its_questions(folder
         press("go", value=0)
         tab.wait(lambda: 'data-question="1"' in tab.html)
         assert 'data-question="1" data-closed="1"' not in tab.html
+
+
+def test_who_may_only_look_chooses_a_language_that_comes_while_the_page_is_open(folder: Path) -> None:
+    (folder / "velocity.de.toml").unlink()
+    viewer = ViewerServer(Store(), Settings(lessons=folder), Clouds())
+    access = {"token": None, "read_only": True, "rate": 0.0, "login_page": static_folder() / "login.html"}
+    memory = json.dumps({"address": "http://127.0.0.1/", "state": encode(PageState(lesson="velocity"))})
+    with serve_viewer(viewer, access=access) as port, FakeBrowser(port, memory=memory) as tab:
+
+        def labels() -> list[str]:
+            return [element["props"].get("label", "") for element in tab.gui.values()]
+
+        tab.settle()
+        assert "Language" not in labels()
+        (folder / "velocity.de.toml").write_text(GERMAN, encoding="utf-8")
+        for radians in (True, False):  # the files are read at the first change, and chosen from at the next
+            tab.set("Radians", radians)
+            tab.settle()
+        tab.wait(lambda: "Language" in labels(), 5.0)
+        tab.set("Language", "Deutsch")
+        tab.wait(lambda: "1. Eine Spalte" in tab.html)
 
 
 @pytest.mark.parametrize(
