@@ -259,10 +259,10 @@ def _configure_sqlite(connection: Any, _: object) -> None:
 
 
 def _write_ahead(connection: Any) -> None:
-    """Have SQLite write ahead; of processes that open a new file at the same time, one does it for all.
+    """Switch SQLite's file to write-ahead logging, which it keeps; waits while another process does so.
 
-    SQLite refuses the others at once, without the wait that it makes for every other lock: both hold the file
-    for reading, and each would wait for the other.
+    SQLite's own timeout does not count here. Two processes that switch a new file at the same time both hold it
+    for reading, and would wait for each other, so SQLite refuses one of them at once.
     """
     end = steady() + WAIT
     while True:

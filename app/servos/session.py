@@ -89,7 +89,7 @@ class Gripper:
     def step(self, seconds: float) -> float:
         """Go on, at a limited speed and not far ahead of where it is: what it holds, it squeezes no harder.
 
-        Returns how far it was open before.
+        Returns how far it was open before this step.
         """
         here = float(self._bus.positions([self.motor])[0])
         if self.on:

@@ -38,8 +38,8 @@ SYSTEM_DARK = "system-dark"  # there too: whether the visitor's system is dark n
 TEXT_SIZE = "text-size"  # there too: of the labels in the visitor's scene
 FIT, LOOK_FROM = "fit-arm", "look-from"  # there too: where the visitor's own camera goes
 FRAME = "frame"  # there too: the frame in which the tool's pose is written
-CONTROL = "GuiUpdateMessage"  # of a control of viser's: who may only look changes those of the tab View alone
-# All that a visitor sends who may only look: what this page alone shows otherwise by it.
+CONTROL = "GuiUpdateMessage"  # a changed control of viser's; read-only visitors change those of the tab View only
+# All messages that a read-only visitor may send: they change only how the visitor's own page shows things.
 LOOKS = frozenset({CAMERA, MEMORY, HELLO, SYSTEM_DARK, TEXT_SIZE, FIT, LOOK_FROM, FRAME, CONTROL})
 
 # Of a page and its first websocket, of its channel, of its files: below the prefix of the service.

@@ -83,7 +83,7 @@ class ExitFacts(Facts[ExitSettings]):
     def exits(self) -> Exits | None:
         """The ways out; None: none are shown, or they are still searched.
 
-        Those that were found for other obstacles are none: the search for these has not begun yet then.
+        Those that were found for other obstacles do not count: the search for the present ones has not begun yet.
         """
         result = self.work("exits")
         found: Exits | None = result.value

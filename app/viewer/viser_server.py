@@ -159,7 +159,7 @@ class PortlessServer(infra.WebsockServer):
                 await asyncio.sleep(0)  # others come between the messages of a burst
 
     def _is_allowed(self, connection: Connection, number: int, message: infra.Message) -> bool:
-        """Whether a message that was let in is heard: of those who may only look, not of every control."""
+        """Whether a message is handled: visitors who may only look may change some controls, not all."""
         if connection.rights.compute or not isinstance(message, messages.GuiUpdateMessage):
             return True
         return self.lets_change(number, message.uuid)

@@ -55,7 +55,7 @@ class Track:
         t: times ``(k,)`` of changes, seconds.
         commanded, measured: configurations ``(k, n)``, radians (metres); NaN before the first one.
         opening: how far the gripper was to be open ``(k,)``, 0 (closed) to 1 (open); NaN before the first one.
-        measured_opening: how far it was measured to be open ``(k,)``; NaN where nobody knows.
+        measured_opening: how far it was measured to be open ``(k,)``; NaN where it is not known.
     """
 
     t: Array
@@ -78,7 +78,7 @@ class Track:
         return float(known[0]) if len(known) else None
 
     def measured_opening_at(self, time: float) -> float | None:
-        """How far the gripper was measured to be open at a time; None: nobody knows."""
+        """How far the gripper was measured to be open at a time; None: it is not known."""
         found = self.measured_opening[self._row(time) :][:1]
         return None if np.isnan(found).any() or not len(found) else float(found[0])
 

@@ -15,8 +15,8 @@ from kin.parsing import Limits, TextError, read_csv
 
 LONGEST_ROW = 16 * 1024  # characters: two numbers and names for each of 32 joints are a few thousand
 WAYS = {"commanded": SHOWN, "measured": MEASURED}
-GRIPPER = "gripper (0 to 1)"  # the column behind the joints, if anything is known of it
-GRIPPERS = [GRIPPER, "measured gripper (0 to 1)"]  # both, if it was measured
+GRIPPER = "gripper (0 to 1)"  # the column after the joints, if the recording has an opening
+GRIPPERS = [GRIPPER, "measured gripper (0 to 1)"]  # both, if it has a measured one
 
 
 def heads(robot: Robot) -> list[str]:

@@ -79,8 +79,8 @@ class ComputeProcess:
     def wait(self) -> None:
         """Wait until a process takes jobs, started if there is none; raises `LostError` if it does not.
 
-        One that another thread has started and that ends meanwhile is an error here, too: the next one may take as
-        long to load.
+        Also raises it if the process that another thread has started ends while this one waits for its turn: the
+        next process may take as long to load.
         """
         before = self._lost
         with self._asking:

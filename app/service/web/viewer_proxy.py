@@ -103,10 +103,10 @@ _SCRIPTS = (
     b"describe",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints", b"keys")
-# The first script runs at once, and says so if another one fails. The others stand at the end of the body, which
-# they use, and are only announced in the head. They have no `defer`: viser's script unpacks itself and starts as
-# soon as the page is read, before scripts that are put off and come late. Styles come after those of viser, which
-# its script puts into the head.
+# The first script runs at once, and says so if another one fails. The others are at the end of the body, whose
+# elements they use; the head only preloads them. They have no `defer`: viser's script unpacks itself and starts as
+# soon as the page is parsed, which may be before deferred scripts have loaded. Styles come after those of viser,
+# which its script puts into the head.
 _HEAD = b"".join(
     [b'<link rel="stylesheet" href="../static/start.css"><script src="../static/start.js"></script>']
     + [b'<link rel="preload" as="script" href="../static/%s.js">' % name for name in _SCRIPTS]

@@ -86,7 +86,7 @@ class Result:
         done, total: progress of a shared computation; `total` is 0 until it is known.
         finished: whether it has ended.
         error: why there is no result.
-        args: those of the work that it is of. Until the feature has gone on, it may declare others already.
+        args: the arguments that it was computed from. The feature may declare others before the work begins anew.
     """
 
     value: Any = None

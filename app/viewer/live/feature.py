@@ -131,7 +131,7 @@ class Connect(DeclaredFeature[TapeSettings, Facts[TapeSettings]]):
             self.change(drawings=merged(self.settings.drawings or {}, drawn, self._numbers))
 
     def follow_gripper(self) -> None:
-        """The gripper on show opens or closes: by how much the measured one is beyond is another difference."""
+        """The gripper on show opens or closes: its difference from the measured one changes."""
         if self.settings.measured_gripper is not None:
             self.schedule()
 

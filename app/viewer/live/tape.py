@@ -147,7 +147,7 @@ class Tape:
 
     @property
     def measured_gripper(self) -> float | None:
-        """How far the gripper was measured to be open at the present time; None: nobody knows."""
+        """How far the gripper was measured to be open at the present time; None: it is not known."""
         return None if self._track is None else self._track.measured_opening_at(self.time)
 
     def _at(self, time: float) -> tuple[Array | None, Array | None]:

@@ -122,11 +122,11 @@ def recording(seconds: float, count: int, size: int, state: str, why: str, other
 def measured(
     robot: Robot, joints: tuple[bytes, bytes] | None, fingers: tuple[float, float] | None, units: Units
 ) -> str:
-    """The measured joint values and opening of the gripper, and by how much they are beyond those on show.
+    """The measured joint values and opening of the gripper, and their differences from those on show.
 
     Args:
-        joints: by how much they are beyond, and the values.
-        fingers: how far the gripper is open, as measured and as on show.
+        joints: the differences, and the measured values, both as bytes; None: not measured.
+        fingers: how far the gripper is open, as measured and as on show; None: not measured.
     """
     rows = []
     if joints is not None:
