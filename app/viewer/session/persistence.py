@@ -152,14 +152,16 @@ class Persistence:
         """Store the present state in the browser, unless it is stored already.
 
         Args:
-            key: where to, as `History.take_key`; another viewpoint alone always replaces the present entry.
+            key: where to, as `History.take_key`; another viewpoint alone always replaces the present entry, and so
+                does every state of a visitor who may only look: that page cannot go back.
         """
         self._since = None
         self._page.camera.look()
         state = self.snapshot()
         text, self._opened = self._written(state), self._page.lessons.opened
         if text != self._page.links.saved:
-            replaces = self.led or (key != KEY_RETURN and same(state, self._state))
+            stays = key != KEY_RETURN and same(state, self._state)
+            replaces = self.led or stays or not self._page.rights.compute
             self._page.links.saved, self._state = text, state
             self._page.channel.notify(KEY_REPLACE if replaces else key, text)
             if state.lesson is not None and not self._page.activity.practice.seated:

@@ -33,7 +33,7 @@ from app.shared.settings import Settings
 from app.viewer.own_arm import own_arm
 from app.viewer.session.choices import ViewState
 from app.viewer.session.events import MESSAGES
-from app.viewer.session.state import PageState, encode
+from app.viewer.session.state import KEY_REPLACE, PageState, encode
 
 TOKEN = "correct horse battery"
 HEADER = {"authorization": f"Bearer {TOKEN}"}
@@ -357,6 +357,8 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             tab.wait(lambda: tab.value("1 rotating base") == pytest.approx(math.pi / 2, abs=1e-3))
             tab.settle()
             assert (tab.tool_pose() == before).all()
+            tab.wait(lambda: bool(tab.kept_as))
+            assert set(tab.kept_as) == {KEY_REPLACE}, "the page cannot go back to another entry"
 
 
 @pytest.mark.full
