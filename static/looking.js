@@ -22,6 +22,7 @@
     else {
       control.ariaDisabled = acts ? null : "true";
       control.tabIndex = acts ? 0 : -1;
+      if (!acts) control.blur(); // viser's own arrow keys would move it
     }
   }
 

@@ -6,6 +6,8 @@ import pytest
 from playwright.sync_api import Browser, expect
 from test_class import Member
 
+import kin
+
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 JOINT = "2 rotating elbow"
@@ -40,16 +42,23 @@ def test_what_was_disabled_comes_back_when_a_frozen_class_goes_on(browser: Brows
         member.close()
 
 
-def test_what_others_disable_and_enable_keeps_its_state(browser: Browser, address: str) -> None:
-    """As where viser or the service enables a control of a frozen class, or has disabled one before."""
+def test_controls_with_the_focus_and_those_that_others_disable_or_enable(browser: Browser, address: str) -> None:
+    """viser or the service may enable a control while a class is frozen, or have disabled one before."""
     teacher = Member(browser, address)
     student = Member(browser, address, teacher.code, "Ann")
     student.open("Move")
     home, recall = (student.page.get_by_role("button", name=name) for name in ("Home", "Move target to tool"))
+    student.select(kin.get_robot("so101"))
+    slider = student.page.get_by_role("slider", name="Gripper (%)")
+    before = slider.get_attribute("aria-valuenow", timeout=8000)
+    assert before is not None
+    slider.focus()
     recall.evaluate("button => { button.disabled = true; }")
     teacher.do("freeze")
     student.shows("[data-class-frozen]")
     expect(home).to_be_disabled()
+    student.page.keyboard.press("ArrowLeft")
+    expect(slider).to_have_attribute("aria-valuenow", before)
     home.evaluate("button => { button.disabled = false; }")
     expect(home).to_be_disabled()
     teacher.do("freeze")
