@@ -120,7 +120,7 @@ def differences(tab: FakeBrowser, page: VisitorPage) -> list[str]:
     units = [1.0 if joint.kind == "revolute" else 0.001 for joint in robot.joints]
     shown = [tab.value(label(robot, i)) for i in range(robot.n)]
     angles = [math.radians(v) if unit == 1.0 else unit * v for v, unit in zip(shown, units, strict=True)]
-    link = decode(tab.kept[-1], STORE.robots) if tab.kept else None
+    link = decode(tab.kept[-1], STORE.robots).q if tab.kept else arm.q
     aim = T if arm.target is None else arm.target
     checks = {
         "goal": np.allclose(arm.q, arm.goal),
@@ -130,7 +130,7 @@ def differences(tab: FakeBrowser, page: VisitorPage) -> list[str]:
         "read-out": np.allclose(tool, 1000 * T[:3, 3], atol=0.06),
         "sliders": np.allclose(angles, arm.goal, atol=2e-4),
         "locks": tuple(tab.gui[tab.element("Locked")]["props"]["options"]) == lock_buttons(arm.locks),
-        "link": link is None or (link.q is not None and np.allclose(link.q, arm.q, atol=1e-6)),
+        "link": link is not None and link.shape == arm.q.shape and np.allclose(link, arm.q, atol=1e-6),
     }
     return [name for name, holds in checks.items() if not holds]
 
