@@ -60,6 +60,8 @@ class Slots:
     def give_back(self, client: str) -> None:
         """End the use of a slot; the next client waiting gets it."""
         self._add(client, -1)
+        if client in self._waiting:
+            self._waiting[client] = self._waiting.pop(client)  # it is the last of those with as few slots
         while self.taken < self.most and (following := self._next()) is not None:
             queue = self._waiting[following]
             slot = queue.popleft()
@@ -70,7 +72,7 @@ class Slots:
                 slot.set_result(None)
 
     def _next(self) -> str | None:
-        """Of the clients waiting the one with the fewest slots, and among those the first."""
+        """Of the clients waiting the one with the fewest slots, and among those the one served longest ago."""
         able = [client for client in self._waiting if self._taken_by[client] < self.most_of_one]
         return min(able, key=self._taken_by.__getitem__, default=None)
 

@@ -45,6 +45,23 @@ def test_the_client_with_the_fewest_places_is_next():
     assert asyncio.run(run()) == ["a", "a", "b", "c", "a", "a"]
 
 
+def test_a_client_with_many_requests_does_not_keep_the_only_slot():
+    async def run() -> list[str]:
+        slots = Slots(1)
+        served: list[str] = []
+
+        async def use(client: str) -> None:
+            await slots.wait(client)
+            served.append(client)
+            await asyncio.sleep(0.001)
+            slots.give_back(client)
+
+        await asyncio.gather(*map(use, ("a", "a", "a", "a", "b", "b", "c")))
+        return served
+
+    assert asyncio.run(run()) == ["a", "b", "c", "a", "b", "a", "a"]
+
+
 def test_a_client_at_its_share_waits_though_there_are_places():
     async def run() -> None:
         slots = Slots(4, 0.5)
