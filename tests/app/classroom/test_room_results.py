@@ -189,7 +189,7 @@ def answer_much(school: Class, each: int) -> None:
             "room_id": school.room.id,
             "seat_id": seats[i % 30],
             "exercise": "two-elbows",
-            "seed": i,
+            "seed": i % 600,  # 20 for each student, whose work is kept by the seed
             "answer": ["9" * 2000],
             "verdict": "Too large.",
             "score": 0.5,
